@@ -1,0 +1,135 @@
+"""Time-stamped streams and what belongs to them: the input of every method.
+
+A position is (latitude rad, longitude rad, ellipsoidal height m) where the recording is geodetic, and
+(north m, east m, height m) on a local tangent plane where it is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.rig import Rig, Vector, zero_vector
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ImuStream:
+    """Increments of one IMU in array axes, each over the interval that ends at its time stamp."""
+
+    name: str
+    time: Array
+    """s, shape (T,), strictly increasing"""
+    dtheta: Array
+    """rad, shape (T, 3)"""
+    dvel: Array
+    """m/s, shape (T, 3)"""
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate: one over the median interval."""
+        return float(1.0 / np.median(np.diff(self.time)))
+
+
+@dataclass(frozen=True)
+class GnssStream:
+    """Positions, and where the receiver gives them velocities, of the antenna."""
+
+    time: Array
+    """s, shape (M,)"""
+    position: Array
+    """shape (M, 3), see the module's docstring"""
+    position_std: Array
+    """m north, east, down, shape (M, 3)"""
+    velocity: Array | None = None
+    """m/s north, east, down, shape (M, 3)"""
+    velocity_std: Array | None = None
+    """m/s, shape (M, 3)"""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the solution is judged by; what the reference system does not give is None."""
+
+    time: Array
+    """s, shape (R,)"""
+    position: Array
+    """shape (R, 3), see the module's docstring"""
+    velocity: Array | None = None
+    """m/s north, east, down, shape (R, 3)"""
+    attitude: Array | None = None
+    """roll, pitch, heading, rad, shape (R, 3)"""
+    lever_arm: Vector = field(default_factory=zero_vector)
+    """The reference's point in the array frame, m."""
+
+
+@dataclass(frozen=True)
+class StartOptions:
+    """How the navigation state is found at the start; what is None is found from the data."""
+
+    time: float | None = None
+    """s; None: the first instant at which all that is needed is there"""
+    end_time: float | None = None
+    """s; None: the end of the data"""
+    position: Vector | None = None
+    """of the array origin, see the module's docstring"""
+    velocity: Vector | None = None
+    """m/s north, east, down"""
+    roll_pitch: Array | None = None
+    """rad, shape (2,)"""
+    heading: float | None = None
+    """rad"""
+    heading_from: str = "auto"
+    """value, gnss-course, reference, or auto: the first of these that the data allow"""
+    static_interval: tuple[float, float] | None = None
+    """s, s: the array stands still; None: looked for"""
+    position_std: Vector | None = None
+    """m north, east, down"""
+    velocity_std: Vector | None = None
+    """m/s"""
+    attitude_std: Vector | None = None
+    """rad: roll, pitch, heading"""
+    estimate_gyro_bias: bool = True
+    """use a static interval for the gyro biases of IMUs"""
+
+
+@dataclass(frozen=True)
+class FilterOptions:
+    """What the filter is told beyond the rig."""
+
+    gate_limit: float | None = 50.0
+    """A fix is rejected whose normalized innovation squared exceeds this; None: no gate. Chi-square with three
+    degrees of freedom exceeds 50 once in 10^10."""
+    gate_reopen_after: int = 5
+    """After that many rejections in a row the next fix is believed and the position variance grows to match."""
+    gnss_snap: float = 1e-4
+    """s: a fix nearer than this to an IMU epoch is applied at that epoch; otherwise the interval is split."""
+    gravity: float = 9.80665
+    """m/s^2, on a local tangent plane only."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Everything that a method needs: the rig, the streams on one clock, how to start, what to leave out."""
+
+    rig: Rig
+    imus: tuple[ImuStream, ...]
+    """in the order of `rig.imus`"""
+    gnss: GnssStream | None = None
+    reference: Reference | None = None
+    geodetic: bool = True
+    outages: tuple[tuple[float, float], ...] = ()
+    """s, s: intervals in which GNSS is withheld from the filter"""
+    start: StartOptions = StartOptions()
+    options: FilterOptions = FilterOptions()
+    name: str = "recording"
+    config_text: str = ""
+    """the configuration in force, as YAML"""
+    warnings: tuple[str, ...] = ()
+
+    def only(self, index: int) -> Recording:
+        """Return the recording with just the IMU of that index."""
+        return replace(self, rig=self.rig.only(index), imus=(self.imus[index],))

@@ -1,0 +1,174 @@
+"""What is mounted where: IMUs with their noise, rotation and lever arm, and the GNSS antenna.
+
+Everything is SI inside. Datasheet units (deg/h, mGal, ppm, deg/sqrt(h)) appear only in the constructors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polyins.errors import InputError
+
+Vector = NDArray[np.float64]
+"""A float64 array of shape (3,)."""
+
+DEG = np.pi / 180.0
+MGAL = 1e-5  # m/s^2
+PPM = 1e-6
+HOUR = 3600.0
+
+MAX_LEVER_ARM_M = 100.0
+
+
+def _vector(value: ArrayLike) -> Vector:
+    return np.broadcast_to(np.asarray(value, dtype=float), (3,)).copy()
+
+
+def zero_vector() -> Vector:
+    """Return the vector of three zeros."""
+    return np.zeros(3)
+
+
+@dataclass(frozen=True)
+class NoiseGrade:
+    """The error statistics of one IMU, per axis, SI, shape (3,) each.
+
+    Biases and scale factors are first-order Gauss-Markov processes with the steady-state standard deviations given
+    here and one correlation time (paper A, section III-B2).
+    """
+
+    angle_random_walk: Vector
+    """rad/sqrt(s)"""
+    velocity_random_walk: Vector
+    """m/s/sqrt(s)"""
+    gyro_bias_std: Vector
+    """rad/s"""
+    accel_bias_std: Vector
+    """m/s^2"""
+    gyro_scale_std: Vector
+    """relative"""
+    accel_scale_std: Vector
+    """relative"""
+    correlation_time: float
+    """s"""
+
+    def __post_init__(self) -> None:
+        for name in ("angle_random_walk", "velocity_random_walk", "gyro_bias_std", "accel_bias_std",
+                     "gyro_scale_std", "accel_scale_std"):  # fmt: skip
+            value = getattr(self, name)
+            if not np.all(np.isfinite(value)) or np.any(value < 0.0):
+                raise InputError(f"noise: {name} is {value}, expected numbers that are not negative")
+        if not self.correlation_time > 0.0:
+            raise InputError(f"noise: correlation_time is {self.correlation_time}, expected a positive number")
+
+    @classmethod
+    def from_datasheet(
+        cls,
+        *,
+        angle_random_walk_deg_sqrt_h: ArrayLike,
+        velocity_random_walk_m_s_sqrt_h: ArrayLike,
+        gyro_bias_deg_h: ArrayLike,
+        accel_bias_mgal: ArrayLike,
+        gyro_scale_ppm: ArrayLike,
+        accel_scale_ppm: ArrayLike,
+        correlation_time_h: float,
+    ) -> NoiseGrade:
+        """Build from the units of datasheets; each value is one number or one per axis."""
+        return cls(
+            angle_random_walk=_vector(angle_random_walk_deg_sqrt_h) * DEG / np.sqrt(HOUR),
+            velocity_random_walk=_vector(velocity_random_walk_m_s_sqrt_h) / np.sqrt(HOUR),
+            gyro_bias_std=_vector(gyro_bias_deg_h) * DEG / HOUR,
+            accel_bias_std=_vector(accel_bias_mgal) * MGAL,
+            gyro_scale_std=_vector(gyro_scale_ppm) * PPM,
+            accel_scale_std=_vector(accel_scale_ppm) * PPM,
+            correlation_time=correlation_time_h * HOUR,
+        )
+
+    def averaged(self, count: int) -> NoiseGrade:
+        """Return the grade of the mean of `count` IMUs of this grade whose errors are independent."""
+        root = np.sqrt(count)
+        return NoiseGrade(
+            self.angle_random_walk / root,
+            self.velocity_random_walk / root,
+            self.gyro_bias_std / root,
+            self.accel_bias_std / root,
+            self.gyro_scale_std / root,
+            self.accel_scale_std / root,
+            self.correlation_time,
+        )
+
+
+@dataclass(frozen=True)
+class ImuErrors:
+    """What is known of the twelve slow errors of one IMU at the start, in array axes, shape (3,) each."""
+
+    gyro_bias: Vector = field(default_factory=zero_vector)
+    """rad/s"""
+    accel_bias: Vector = field(default_factory=zero_vector)
+    """m/s^2"""
+    gyro_scale: Vector = field(default_factory=zero_vector)
+    """relative"""
+    accel_scale: Vector = field(default_factory=zero_vector)
+    """relative"""
+
+    def as_array(self) -> NDArray[np.float64]:
+        """Return the twelve errors in the order of the filter's states, shape (12,)."""
+        return np.concatenate([self.gyro_bias, self.accel_bias, self.gyro_scale, self.accel_scale])
+
+
+@dataclass(frozen=True)
+class Imu:
+    """One IMU: its name, its mount and what is known of its errors."""
+
+    name: str
+    noise: NoiseGrade
+    rotation: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
+    """C_ab, shape (3, 3): maps vectors from the sensor's axes to the array's. Readers apply it."""
+    position: Vector = field(default_factory=zero_vector)
+    """Where it sits in the array frame, m, from the array origin."""
+    initial_errors: ImuErrors = field(default_factory=ImuErrors)
+    initial_std: ImuErrors | None = None
+    """How sure `initial_errors` is; None: the noise grade's steady-state values."""
+
+    def __post_init__(self) -> None:
+        check_lever_arm(f"IMU {self.name}: position", self.position)
+        if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(self.rotation) < 0:
+            raise InputError(f"IMU {self.name}: the mount is not a rotation; expected right-handed orthogonal axes")
+
+    def start_std(self) -> NDArray[np.float64]:
+        """Return the initial standard deviation of the twelve errors, shape (12,)."""
+        if self.initial_std is not None:
+            return self.initial_std.as_array()
+        n = self.noise
+        return np.concatenate([n.gyro_bias_std, n.accel_bias_std, n.gyro_scale_std, n.accel_scale_std])
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The array: its IMUs and the GNSS antenna."""
+
+    imus: tuple[Imu, ...]
+    antenna: Vector = field(default_factory=zero_vector)
+    """Position of the GNSS antenna in the array frame, m."""
+
+    def __post_init__(self) -> None:
+        check_lever_arm("antenna: position", self.antenna)
+        if not self.imus:
+            raise InputError("rig: no IMU; expected at least one")
+        names = [imu.name for imu in self.imus]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"imus: two IMUs are named {name!r}; expected a name of its own for each")
+
+    def only(self, index: int) -> Rig:
+        """Return the rig with just the IMU of that index."""
+        return replace(self, imus=(self.imus[index],))
+
+
+def check_lever_arm(what: str, vector: Vector) -> None:
+    """Raise InputError for a lever arm that is not finite or longer than any rig (100 m)."""
+    if not np.all(np.isfinite(vector)) or np.linalg.norm(vector) > MAX_LEVER_ARM_M:
+        raise InputError(f"{what} is {np.asarray(vector).tolist()} m; expected at most {MAX_LEVER_ARM_M:.0f} m")
