@@ -1,0 +1,339 @@
+"""How a run starts: levelling, gyro biases, heading, velocity and position, from what is given and what is recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.kernels import earth
+from polyins.recording import GnssStream, Recording, StartOptions
+from polyins.rig import DEG
+from polyins.timesync import Aligned
+
+Array = NDArray[np.float64]
+
+WINDOW = 1.0  # s
+STILL_RATE = 0.4 * DEG  # rad/s, of the averaged gyro within a window
+STILL_FORCE = 0.10  # m/s^2
+SHORTEST_STANDSTILL = 3.0  # s
+LONGEST_STANDSTILL = 60.0  # s
+COURSE_SPEED = 1.5  # m/s: slower than this the direction of motion is no heading
+
+
+@dataclass(frozen=True)
+class Start:
+    """The navigation state of the array origin at the first epoch, how sure it is, and where it came from."""
+
+    time: float
+    """s"""
+    position: Array
+    """see polyins.recording"""
+    velocity: Array
+    """m/s north, east, down"""
+    attitude: Array
+    """roll, pitch, heading, rad"""
+    position_std: Array
+    """m"""
+    velocity_std: Array
+    """m/s"""
+    attitude_std: Array
+    """rad, of phi about north, east, down"""
+    imu_errors: Array
+    """shape (N, 12)"""
+    imu_error_std: Array
+    """shape (N, 12)"""
+    sources: dict[str, str]
+    """what was used for each of them, in words"""
+
+
+def find_start(recording: Recording, aligned: Aligned) -> Start:
+    """Find the start of a recording whose IMUs are on one time base; raise InputError where nothing gives it."""
+    return _Search(recording, aligned).run()
+
+
+class _Search:
+    """One start being found; each step fills in what the steps after it need."""
+
+    def __init__(self, recording: Recording, aligned: Aligned) -> None:
+        self.recording = recording
+        self.options: StartOptions = recording.start
+        self.aligned = aligned
+        self.sources: dict[str, str] = {}
+        self.errors = np.array([imu.initial_errors.as_array() for imu in recording.rig.imus])
+        self.error_std = np.array([imu.start_std() for imu in recording.rig.imus])
+        self.fixes = velocities_from_positions(recording.gnss, recording.geodetic) if recording.gnss else None
+
+    def run(self) -> Start:
+        still = self._standstill()
+        time = self._time(still)
+        velocity, velocity_std = self._velocity(time, still)
+        roll_pitch, tilt_std = self._roll_pitch(time, still, velocity)
+        heading, heading_std = self._heading(time, still, roll_pitch, velocity)
+        attitude = np.array([roll_pitch[0], roll_pitch[1], heading])
+        position, position_std = self._position(time, attitude)
+        if still and self.options.estimate_gyro_bias:
+            self._gyro_biases(still, attitude, position)
+        else:
+            self.sources["gyro_bias"] = "configuration"
+        given = self.options.attitude_std
+        return Start(
+            time=time,
+            position=position,
+            velocity=velocity,
+            attitude=attitude,
+            position_std=position_std if self.options.position_std is None else self.options.position_std,
+            velocity_std=velocity_std if self.options.velocity_std is None else self.options.velocity_std,
+            attitude_std=np.array([tilt_std, tilt_std, heading_std]) if given is None else given,
+            imu_errors=self.errors,
+            imu_error_std=self.error_std,
+            sources=self.sources,
+        )
+
+    def _standstill(self) -> tuple[float, float] | None:
+        if self.options.static_interval is not None:
+            begin, end = self.options.static_interval
+            if end - begin < WINDOW or len(self.aligned.between(begin, end).time) < 2:
+                raise InputError(
+                    f"start: static interval {begin} to {end} s holds no second of data; expected at least one"
+                )
+            self.sources["standstill"] = f"given: {begin:.3f} to {end:.3f} s"
+            return begin, end
+        nothing_left = self.options.roll_pitch is not None and not self.options.estimate_gyro_bias
+        if nothing_left or self.options.heading_from == "reference":
+            return None
+        found = find_standstill(self.aligned, self.fixes)
+        if found:
+            self.sources["standstill"] = f"found: {found[0]:.3f} to {found[1]:.3f} s"
+        return found
+
+    def _time(self, still: tuple[float, float] | None) -> float:
+        first, last = self.aligned.time[0], self.aligned.time[-1]
+        if self.options.time is not None:
+            wanted, self.sources["time"] = self.options.time, "given"
+        elif still:
+            wanted, self.sources["time"] = still[1], "end of the standstill"
+        elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
+            wanted, self.sources["time"] = self._moving(first), "first fix in motion"
+        elif self.fixes is not None and self.options.position is None:
+            wanted, self.sources["time"] = max(first, float(self.fixes.time[0])), "first fix"
+        else:
+            wanted, self.sources["time"] = first, "first epoch"
+        if not first <= wanted <= last - 1.0:
+            raise InputError(
+                f"start: time {wanted:.3f} s; expected within the IMU data, {first:.3f} to {last:.3f} s,"
+                " with at least a second left"
+            )
+        return float(self.aligned.time[np.searchsorted(self.aligned.time, wanted)])
+
+    def _moving(self, after: float) -> float:
+        """Return the time of the first fix after `after` whose speed makes its course a heading."""
+        assert self.fixes is not None
+        assert self.fixes.velocity is not None
+        speed = np.hypot(self.fixes.velocity[:, 0], self.fixes.velocity[:, 1])
+        moving = np.flatnonzero((speed > COURSE_SPEED) & (self.fixes.time >= after))
+        if len(moving) == 0:
+            raise InputError(
+                f"start: no heading: GNSS never moves faster than {COURSE_SPEED} m/s; expected start.heading_deg"
+            )
+        return float(self.fixes.time[moving[0]])
+
+    def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
+        reference = self.recording.reference
+        if self.options.velocity is not None:
+            self.sources["velocity"] = "given"
+            return self.options.velocity, np.full(3, 0.1)
+        if still and still[0] <= time <= still[1] + 0.5:
+            self.sources["velocity"] = "standstill"
+            return np.zeros(3), np.full(3, 0.05)
+        if self.options.heading_from == "reference" and reference is not None:
+            self.sources["velocity"] = "reference"
+            velocity = reference.velocity
+            if velocity is None:
+                velocity = _differences(reference.time, reference.position, self.recording.geodetic)
+            return _interpolate(time, reference.time, velocity), np.full(3, 0.3)
+        if self.fixes is not None and self.fixes.velocity is not None:
+            self.sources["velocity"] = "GNSS"
+            return _interpolate(time, self.fixes.time, self.fixes.velocity), np.full(3, 0.5)
+        raise InputError("start: no velocity; expected GNSS, a standstill, or start.velocity_m_s")
+
+    def _mean(self, begin: float, end: float) -> tuple[Array, Array, float]:
+        """Return the mean rates and specific forces of each IMU, shape (N, 3), biases removed, and the time."""
+        part = self.aligned.between(begin, end)
+        duration = part.time[-1] - part.time[0]
+        mean = part.increments[1:].sum(axis=0).T / duration
+        return mean[:, :3] - self.errors[:, :3], mean[:, 3:] - self.errors[:, 3:6], float(duration)
+
+    def _roll_pitch(
+        self, time: float, still: tuple[float, float] | None, velocity: Array
+    ) -> tuple[tuple[float, float], float]:
+        reference = self.recording.reference
+        if self.options.roll_pitch is not None:
+            self.sources["roll_pitch"] = "given"
+            return (float(self.options.roll_pitch[0]), float(self.options.roll_pitch[1])), 0.5 * DEG
+        if self.options.heading_from == "reference" and reference is not None and reference.attitude is not None:
+            self.sources["roll_pitch"] = "reference"
+            attitude = _interpolate(time, reference.time, reference.attitude[:, :2])
+            return (float(attitude[0]), float(attitude[1])), 3.0 * DEG
+        if still:
+            self.sources["roll_pitch"] = "levelled at standstill"
+            _, force, _ = self._mean(*still)
+            bias_std = self.error_std[:, 3:6].mean() / 9.8
+            return level(force.mean(axis=0)), float(max(0.1 * DEG, bias_std))
+        self.sources["roll_pitch"] = "levelled in motion, acceleration from GNSS"
+        _, force, _ = self._mean(time - 0.5, time + 0.5)
+        heading = float(np.arctan2(velocity[1], velocity[0]))
+        return level(force.mean(axis=0), self._acceleration(time), heading), 3.0 * DEG
+
+    def _acceleration(self, time: float) -> Array:
+        if self.fixes is None or self.fixes.velocity is None:
+            return np.zeros(3)
+        ahead = _interpolate(time + 0.5, self.fixes.time, self.fixes.velocity)
+        return np.asarray(ahead - _interpolate(time - 0.5, self.fixes.time, self.fixes.velocity))
+
+    def _heading(
+        self, time: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float], velocity: Array
+    ) -> tuple[float, float]:
+        wanted, reference = self.options.heading_from, self.recording.reference
+        if self.options.heading is not None and wanted in ("auto", "value"):
+            self.sources["heading"] = "given"
+            return self.options.heading, 1.0 * DEG
+        if wanted == "value":
+            raise InputError("start: heading_from is value; expected start.heading_deg")
+        if wanted == "reference" or (wanted == "auto" and self.fixes is None):
+            if reference is None or reference.attitude is None:
+                raise InputError("start: no heading; expected start.heading_deg, GNSS, or a reference with heading")
+            self.sources["heading"] = "reference"
+            unwrapped = np.unwrap(reference.attitude[:, 2:3], axis=0)
+            return float(_interpolate(time, reference.time, unwrapped)[0]), 2.0 * DEG
+        if self.fixes is None:
+            raise InputError("start: heading_from is gnss-course, but there is no GNSS")
+        assert self.fixes.velocity is not None
+        at = self._moving(time)
+        course = _interpolate(at, self.fixes.time, self.fixes.velocity)
+        turned = self._turned(time, at, still, roll_pitch)
+        self.sources["heading"] = f"GNSS course at {at:.3f} s, less {turned / DEG:.1f} deg turned since the start"
+        return float(np.arctan2(course[1], course[0]) - turned), 5.0 * DEG
+
+    def _turned(
+        self, begin: float, end: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float]
+    ) -> float:
+        """Return how far the heading turns from begin to end, from the gyros alone."""
+        from scipy.spatial.transform import Rotation
+
+        if end <= begin:
+            return 0.0
+        bias = self._mean(*still)[0].mean(axis=0) if still else np.zeros(3)
+        part = self.aligned.between(begin, end)
+        known = bias + self.errors[:, :3].mean(axis=0)
+        steps = part.increments[1:, :3].mean(axis=2) - known * np.diff(part.time)[:, None]
+        attitude = Rotation.from_euler("ZYX", [0.0, roll_pitch[1], roll_pitch[0]])
+        for rotation in Rotation.from_rotvec(steps):
+            attitude = attitude * rotation
+        return float(attitude.as_euler("ZYX")[0])
+
+    def _position(self, time: float, attitude: Array) -> tuple[Array, Array]:
+        if self.options.position is not None:
+            self.sources["position"] = "given"
+            return self.options.position, np.full(3, 0.1)
+        gnss = self.recording.gnss
+        if gnss is None:
+            self.sources["position"] = "zero: there is no position in the recording"
+            return np.zeros(3), np.full(3, 0.01)
+        self.sources["position"] = "GNSS"
+        nearest = int(np.argmin(np.abs(gnss.time - time)))
+        antenna = _interpolate(time, gnss.time, gnss.position)
+        shift = rotation_matrix(attitude) @ self.recording.rig.antenna
+        return antenna - shift / metric(antenna, self.recording.geodetic), gnss.position_std[nearest]
+
+    def _gyro_biases(self, still: tuple[float, float], attitude: Array, position: Array) -> None:
+        """Take what the gyros show at a standstill, less the earth's rate, as their biases."""
+        rate, _, duration = self._mean(*still)
+        if self.recording.geodetic:
+            north, down = np.cos(position[0]), -np.sin(position[0])
+            earth_rate = earth.EARTH_RATE_RAD_S * np.array([north, 0.0, down])
+            rate = rate - rotation_matrix(attitude).T @ earth_rate
+        self.errors[:, :3] += rate
+        for i, imu in enumerate(self.recording.rig.imus):
+            # white noise over the standstill, and a tenth of the grade for what the bias does afterwards
+            self.error_std[i, :3] = np.hypot(
+                imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std
+            )
+        self.sources["gyro_bias"] = f"mean of {duration:.1f} s at standstill"
+
+
+def find_standstill(aligned: Aligned, fixes: GnssStream | None) -> tuple[float, float] | None:
+    """Return the first interval of at least three seconds, at most sixty, in which the array stands still.
+
+    Judged second by second: rates and forces averaged over tenths of a second hardly vary, and the speed that GNSS
+    gives, where it gives one, is that of its noise.
+    """
+    window = max(2, round(WINDOW * aligned.rate_hz))
+    tenth = max(1, round(0.1 * aligned.rate_hz))
+    tenths = window // tenth
+    count = len(aligned.time) // (tenth * tenths)
+    if count < SHORTEST_STANDSTILL / WINDOW:
+        return None
+    used = count * tenths * tenth
+    rates = aligned.increments[:used].mean(axis=2) * aligned.rate_hz
+    spread = rates.reshape(count, tenths, tenth, 6).mean(axis=2).std(axis=1)
+    still = (spread[:, :3].max(axis=1) < STILL_RATE) & (spread[:, 3:].max(axis=1) < STILL_FORCE)
+    edges = aligned.time[np.minimum(np.arange(count + 1) * tenths * tenth, len(aligned.time) - 1)]
+    if fixes is not None and fixes.velocity is not None:
+        speed = np.linalg.norm(fixes.velocity, axis=1)
+        noise = 4.0 * fixes.position_std.max(axis=1)
+        moving = fixes.time[speed > np.maximum(0.3, noise)]
+        for t in moving:
+            still[(edges[:-1] - 1.0 < t) & (t < edges[1:] + 1.0)] = False
+    runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
+    for begin, end in zip(runs[::2], runs[1::2], strict=True):
+        if edges[end] - edges[begin] >= SHORTEST_STANDSTILL:
+            return float(edges[begin]), float(min(edges[end], edges[begin] + LONGEST_STANDSTILL))
+    return None
+
+
+def level(force: Array, acceleration: Array | None = None, heading: float = 0.0) -> tuple[float, float]:
+    """Return roll and pitch (rad) from a mean specific force, and where in motion the acceleration in n.
+
+    C f = a - g, with the heading given: roll and pitch turn f into the level frame's a - g.
+    """
+    a = np.zeros(3) if acceleration is None else acceleration
+    ahead = a[0] * np.cos(heading) + a[1] * np.sin(heading)
+    aside = -a[0] * np.sin(heading) + a[1] * np.cos(heading)
+    vertical = np.hypot(force[1], force[2])
+    roll = np.arcsin(np.clip(aside / vertical, -1, 1)) - np.arctan2(force[1], -force[2])
+    z = force[1] * np.sin(roll) + force[2] * np.cos(roll)
+    pitch = np.arctan2(force[0], -z) - np.arcsin(np.clip(ahead / np.hypot(force[0], z), -1, 1))
+    return float((roll + np.pi) % (2 * np.pi) - np.pi), float(pitch)
+
+
+def rotation_matrix(attitude: Array) -> Array:
+    """Return C_nb of roll, pitch, heading (rad), shape (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_euler("ZYX", attitude[::-1]).as_matrix())
+
+
+def metric(position: Array, geodetic: bool) -> Array:
+    """Return D, metres north, east, down per unit of each coordinate of a position, shape (3,)."""
+    out = np.empty(3)
+    earth.metric(np.asarray(position, dtype=float), geodetic, out)
+    return out
+
+
+def velocities_from_positions(gnss: GnssStream, geodetic: bool) -> GnssStream:
+    """Return the stream with velocities differenced from positions where the receiver gives none."""
+    if gnss.velocity is not None or len(gnss.time) < 2:
+        return gnss
+    return replace(gnss, velocity=_differences(gnss.time, gnss.position, geodetic))
+
+
+def _differences(time: Array, position: Array, geodetic: bool) -> Array:
+    metres = (position - position[0]) * metric(position[0], geodetic)
+    return np.asarray(np.gradient(metres, time, axis=0))
+
+
+def _interpolate(at: float, time: Array, values: Array) -> Array:
+    return np.array([np.interp(at, time, values[:, k]) for k in range(values.shape[1])])

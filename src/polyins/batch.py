@@ -1,0 +1,293 @@
+"""A whole recording through the engine: what the method table says, as arrays, and what comes out, as a Solution."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins import alignment, engine, timesync
+from polyins.alignment import Start
+from polyins.engine import Inputs, Outputs, Plan, State
+from polyins.errors import InputError
+from polyins.kernels import bank, dense, kalman, share
+from polyins.kernels.bank import LANES
+from polyins.methods import Method, find_method
+from polyins.recording import GnssStream, Recording
+from polyins.rig import Imu, Rig
+from polyins.solution import Innovations, Solution
+from polyins.timesync import Aligned
+
+Array = NDArray[np.float64]
+
+CHUNK = 4000
+"""Epochs between two calls of `progress`."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One navigator of the bank: a real IMU, or the virtual one that stands for all."""
+
+    imu: Imu
+    start_errors: Array
+    start_error_std: Array
+    to_origin: Array
+    """m, in array axes"""
+    to_antenna: Array
+
+
+def run(
+    recording: Recording,
+    method: str = "enav-fusion",
+    *,
+    imu: int = 0,
+    progress: Callable[[float], None] | None = None,
+    dense_covariance: bool = False,
+) -> Solution:
+    """Navigate a recording with one method and return its solution.
+
+    `imu` is the index of the IMU that `single` uses. `progress` is called with the share of epochs done. The dense
+    covariance is the papers' form with full matrices, there to be compared with. Raises InputError for a method that
+    is unknown or data that give no start.
+    """
+    row = find_method(method)
+    if row.bank == "one":
+        recording = recording.only(imu)
+    aligned = timesync.align(recording.imus)
+    start = alignment.find_start(recording, aligned)
+    end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
+    aligned = aligned.between(start.time, end)
+    members = _members(row, recording.rig, start)
+    state = build_state(row, recording, members, start)
+    plan = build_plan(row, recording, aligned)
+    inputs = build_inputs(recording, aligned)
+    outputs = build_outputs(len(aligned.time), len(inputs.fix_time), len(members), plan.log_every)
+    work = dense.workspace() if dense_covariance else None
+    first_call_s = warm_up(state, plan, inputs, outputs, work)
+    filter_s = _run(state, plan, inputs, outputs, work, progress)
+    return _solution(row, recording, aligned, start, members, outputs, filter_s, first_call_s)
+
+
+
+
+
+def _members(row: Method, rig: Rig, start: Start) -> list[Member]:
+    if row.bank == "mean":
+        count = len(rig.imus)
+        virtual = Imu("mean", rig.imus[0].noise.averaged(count))
+        errors = start.imu_errors.mean(axis=0)
+        std = np.sqrt((start.imu_error_std**2).mean(axis=0) / count)
+        return [Member(virtual, errors, std, np.zeros(3), rig.antenna)]
+    return [
+        Member(imu, start.imu_errors[i], start.imu_error_std[i], -imu.position, rig.antenna - imu.position)
+        for i, imu in enumerate(rig.imus)
+    ]
+
+
+def build_state(row: Method, recording: Recording, members: list[Member], start: Start) -> State:
+    """Lay out bank and covariance blocks for a method at its start."""
+    count = len(members)
+    spans = [(0, count)] if row.shares == "all" else [(i, i + 1) for i in range(count)]
+    blocks = np.zeros(((count + LANES - 1) // LANES, bank.SIZE))
+    blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
+    c = alignment.rotation_matrix(start.attitude)
+    metres = alignment.metric(start.position, recording.geodetic)
+    for i, member in enumerate(members):
+        _fill_lane(blocks[i // LANES], i % LANES, member, start, c, metres, 1.0 / count)
+    for block in blocks:
+        engine.strapdown.update_matrix(block)
+        engine.strapdown.evaluate_at_own_state(block)
+    groups = np.zeros((len(spans) + (len(spans) > 1), share.SIZE))
+    for g, (first, last) in zip(groups, spans, strict=False):
+        _fill_share(g, members[first:last], start, recording.rig)
+    near = np.array([float(recording.geodetic), 0.0, 0.0, 1.0, recording.options.gravity])
+    engine.move_near(near, start.position[0])
+    for block in blocks:
+        if recording.geodetic:
+            engine.earth.evaluate(block, near[1], near[2], near[3])
+        else:
+            engine.earth.evaluate_plane(block, near[4])
+    state = State(
+        blocks=blocks,
+        groups=groups,
+        members=np.array(spans, dtype=np.int64),
+        measurements=np.zeros((len(spans), kalman.SIZE)),
+        near=near,
+        before=np.zeros(4),
+        clock=np.array([start.time, 1.0]),
+        counters=np.zeros(3, dtype=np.int64),
+    )
+    engine.merge(state)
+    return state
+
+
+def _fill_lane(w: Array, lane: int, member: Member, start: Start, c: Array, metres: Array, weight: float) -> None:
+    from scipy.spatial.transform import Rotation
+
+    def put(field: int, values: Array) -> None:
+        w[field + lane : field + lane + len(values) * LANES : LANES] = values
+
+    put(bank.POSITION, start.position - c @ member.to_origin / metres)
+    put(bank.VELOCITY, start.velocity)
+    put(bank.QUATERNION, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
+    put(bank.ERRORS, member.start_errors)
+    put(bank.TO_ORIGIN, member.to_origin)
+    put(bank.TO_ANTENNA, member.to_antenna)
+    put(bank.WEIGHT, np.array([weight]))
+
+
+def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None:
+    """A share is driven by the noise of its mean member."""
+    noises = [member.imu.noise for member in members]
+    std = np.sqrt(np.mean([member.start_error_std**2 for member in members], axis=0))
+    variances = np.concatenate([start.position_std, start.velocity_std, start.attitude_std, std]) ** 2
+    for i, variance in enumerate(variances):
+        g[share.P + i * (share.STRIDE + 1)] = variance
+    steady = np.mean(
+        [
+            np.concatenate([n.gyro_bias_std, n.accel_bias_std, n.gyro_scale_std, n.accel_scale_std]) ** 2
+            / n.correlation_time
+            for n in noises
+        ],
+        axis=0,
+    )
+    g[share.ERROR_PSD : share.ERROR_PSD + 12] = 2.0 * steady
+    g[share.DECAY : share.DECAY + 12] = np.mean([1.0 / n.correlation_time for n in noises])
+    g[share.GYRO_PSD : share.GYRO_PSD + 3] = np.mean([n.angle_random_walk**2 for n in noises], axis=0)
+    g[share.ACCEL_PSD : share.ACCEL_PSD + 3] = np.mean([n.velocity_random_walk**2 for n in noises], axis=0)
+    g[share.ANTENNA : share.ANTENNA + 3] = members[0].to_antenna if len(members) == 1 else rig.antenna
+
+
+def build_plan(row: Method, recording: Recording, aligned: Aligned) -> Plan:
+    """Return what the engine is told by the method and the options."""
+    options = recording.options
+    return Plan(
+        virtual=row.bank == "mean",
+        shared_mechanization=row.shared_mechanization,
+        to_origin=-np.mean([imu.position for imu in recording.rig.imus], axis=0),
+        gate_limit=np.inf if options.gate_limit is None else float(options.gate_limit),
+        reopen_after=options.gate_reopen_after,
+        gnss_snap=options.gnss_snap,
+        log_every=max(1, round(aligned.rate_hz)),
+    )
+
+
+def build_inputs(recording: Recording, aligned: Aligned) -> Inputs:
+    """Return the aligned increments and the fixes that the filter is shown."""
+    time, fixes = np.empty(0), np.empty((0, 12))
+    if recording.gnss is not None:
+        gnss = recording.gnss
+        shown = (gnss.time > aligned.time[0]) & (gnss.time <= aligned.time[-1])
+        for begin, end in recording.outages:
+            shown &= ~((gnss.time > begin) & (gnss.time < end))
+        time, fixes = gnss.time[shown], _fixes(gnss)[shown]
+    return Inputs(aligned.time, np.ascontiguousarray(aligned.increments), time, fixes)
+
+
+def _fixes(gnss: GnssStream) -> Array:
+    rows = np.zeros((len(gnss.time), 12))
+    rows[:, 0:3] = gnss.position
+    rows[:, 6:9] = gnss.position_std**2
+    rows[:, 9:12] = -1.0
+    if gnss.velocity is not None and gnss.velocity_std is not None:
+        rows[:, 3:6] = gnss.velocity
+        rows[:, 9:12] = gnss.velocity_std**2
+    return rows
+
+
+def build_outputs(epochs: int, fixes: int, imus: int, log_every: int) -> Outputs:
+    """Return empty arrays for what a run writes."""
+    log_rows = (epochs - 2) // log_every + 1 if epochs > 1 else 0
+    return Outputs(
+        states=np.empty((epochs, 10)),
+        variances=np.empty((epochs, 12)),
+        fix_status=np.zeros(fixes, dtype=np.int8),
+        innovations=np.zeros((fixes, 7)),
+        log_time=np.empty(log_rows),
+        log=np.empty((log_rows, 2, 12, imus)),
+    )
+
+
+def warm_up(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, work: tuple[Array, Array] | None) -> float:
+    """Compile the loop, or load it from the cache, and return the seconds that took."""
+    begin = clock.perf_counter()
+    engine.run_epochs(state, plan, inputs, outputs, 1, 1, work)
+    return clock.perf_counter() - begin
+
+
+def _run(
+    state: State,
+    plan: Plan,
+    inputs: Inputs,
+    outputs: Outputs,
+    work: tuple[Array, Array] | None,
+    progress: Callable[[float], None] | None,
+) -> float:
+    epochs = len(inputs.time)
+    state.clock[1] = inputs.time[1] - inputs.time[0]
+    _set_previous(state, plan, inputs)
+    spent = 0.0
+    for first in range(1, epochs, CHUNK):
+        last = min(first + CHUNK, epochs)
+        begin = clock.thread_time()
+        engine.run_epochs(state, plan, inputs, outputs, first, last, work)
+        spent += clock.thread_time() - begin
+        if progress:
+            progress(last / epochs)
+    return spent
+
+
+def _set_previous(state: State, plan: Plan, inputs: Inputs) -> None:
+    """Let the increments that end at the start be the previous ones of the first epoch."""
+    interval = inputs.time[1] - inputs.time[0]
+    engine.load(state, plan, inputs.increments[0], interval)
+    for block in state.blocks:
+        engine.strapdown.compensate(block, 1.0, interval)
+        engine.strapdown.remember(block)
+
+
+def _solution(
+    row: Method,
+    recording: Recording,
+    aligned: Aligned,
+    start: Start,
+    members: list[Member],
+    outputs: Outputs,
+    filter_s: float,
+    first_call_s: float,
+) -> Solution:
+    states, variances = outputs.states[1:], outputs.variances[1:]
+    point = recording.rig.imus[0].position if row.bank == "one" else np.zeros(3)
+    inputs = build_inputs(recording, aligned)
+    status = outputs.fix_status
+    return Solution(
+        method=row.name,
+        geodetic=recording.geodetic,
+        time=aligned.time[1:],
+        position=states[:, 0:3],
+        velocity=states[:, 3:6],
+        attitude=states[:, 6:10],
+        position_variance=variances[:, 0:3],
+        velocity_variance=variances[:, 3:6],
+        phi_covariance=variances[:, 6:12],
+        point=point,
+        imu_names=tuple(member.imu.name for member in members),
+        imu_error_time=outputs.log_time,
+        imu_errors=outputs.log[:, 0].transpose(0, 2, 1),
+        imu_error_std=outputs.log[:, 1].transpose(0, 2, 1),
+        innovations=Innovations(
+            time=inputs.fix_time,
+            residual=outputs.innovations[:, 0:3],
+            std=np.sqrt(outputs.innovations[:, 3:6]),
+            nis=outputs.innovations[:, 6],
+            accepted=(status & 3) != engine.REJECTED,
+            reopened=(status & 3) == engine.REOPENED,
+        ),
+        start={"time_s": start.time, **start.sources},
+        filter_s=filter_s,
+        first_call_s=first_call_s,
+        warnings=recording.warnings + aligned.warnings,
+    )

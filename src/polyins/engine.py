@@ -1,0 +1,318 @@
+"""The one loop over the timeline: propagate the bank, aid it, merge its answers.
+
+Everything that a run remembers from one epoch to the next lives in the arrays of a `State`, so that a run can be
+cut anywhere: in chunks, or into single epochs of a live stream.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from polyins.aiding import gnss
+from polyins.kernels import bank, dense, earth, fuse, kalman, share, strapdown
+from polyins.kernels.bank import LANES
+from polyins.kernels.jit import Array, kernel
+
+UNUSED, ACCEPTED, REJECTED, REOPENED = 0, 1, 2, 3
+"""What became of a fix."""
+
+VELOCITY_REJECTED = 4
+"""Added where the position of a fix was accepted and its velocity was not."""
+
+
+class State(NamedTuple):
+    """What a run remembers."""
+
+    blocks: Array
+    """the bank, (blocks, bank.SIZE)"""
+    groups: Array
+    """a row per share, and one more for the merged state where there are several shares, (., share.SIZE)"""
+    members: Array
+    """int64 (shares, 2): first lane of each share and the one after its last"""
+    measurements: Array
+    """work of the Kalman update, (shares, kalman.SIZE)"""
+    near: Array
+    """geodetic, latitude, its sine and cosine, plane gravity; see `earth.evaluate`"""
+    before: Array
+    """previous mean rate and a flag that it exists; see `fuse.average_increments`"""
+    clock: Array
+    """time of the state, s; length of the last interval, s"""
+    counters: Array
+    """int64: index of the next fix; fixes rejected in a row; next row of the log of IMU errors"""
+
+
+class Plan(NamedTuple):
+    """What a run is told."""
+
+    virtual: bool
+    """average the IMUs into one before navigation"""
+    shared_mechanization: bool
+    to_origin: Array
+    """mean vector from the IMUs to the array origin, m, for a virtual IMU"""
+    gate_limit: float
+    reopen_after: int
+    gnss_snap: float
+    log_every: int
+    """epochs between rows of the log of IMU errors"""
+
+
+class Inputs(NamedTuple):
+    """The aligned recording."""
+
+    time: Array
+    """(T,), the first is the start"""
+    increments: Array
+    """(T, 6, N): dtheta and dvel over the interval that ends at `time`; the first row is only a previous one"""
+    fix_time: Array
+    """(M,)"""
+    fixes: Array
+    """(M, 12): position 3, velocity 3, variance of position 3 and of velocity 3 (negative: no velocity)"""
+
+
+class Outputs(NamedTuple):
+    """What a run writes, a row per epoch, fix, or row of the log."""
+
+    states: Array
+    """(T, 10): position, velocity, quaternion"""
+    variances: Array
+    """(T, 12): of position and velocity; covariance of phi NN, NE, ND, EE, ED, DD"""
+    fix_status: Array
+    """int8 (M,)"""
+    innovations: Array
+    """(M, 7): residual 3, its variance 3, NIS"""
+    log_time: Array
+    """(K,)"""
+    log: Array
+    """(K, 2, 12, N): IMU errors and their std"""
+
+
+@kernel
+def propagate(state: State, plan: Plan, fraction: float, dt: float, work: tuple[Array, Array] | None) -> None:
+    """Advance every IMU, every covariance block and the fused states by dt, a fraction of the measured interval."""
+    blocks, groups, members = state.blocks, state.groups, state.members
+    if state.near[0] != 0.0 and abs(groups[-1, share.POSITION] - state.near[1]) > 5e-4:
+        move_near(state.near, groups[-1, share.POSITION])
+    previous_dt = state.clock[1]
+    ratio = dt * dt / (6.0 * previous_dt * (previous_dt + dt))
+    for b in range(blocks.shape[0]):
+        w = blocks[b]
+        strapdown.compensate(w, fraction, dt)
+        if plan.shared_mechanization:
+            fuse.evaluate_at_fused_state(w, groups[0])
+        else:
+            strapdown.evaluate_at_own_state(w)
+    for s in range(members.shape[0]):
+        g = groups[s]
+        fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
+        share.error_model(g, dt, state.near)
+        if work is None:
+            share.predict(g, dt)
+        else:
+            dense.predict(g, dt, work[0], work[1])
+    for b in range(blocks.shape[0]):
+        w = blocks[b]
+        strapdown.mechanize(w, dt, ratio, state.near)
+        strapdown.remember(w)
+    state.clock[0] += dt
+    state.clock[1] = dt
+    merge(state)
+
+
+@kernel
+def move_near(near: Array, latitude: float) -> None:
+    """Make a latitude the one near which the earth is evaluated."""
+    near[1] = latitude
+    near[2] = math.sin(latitude)
+    near[3] = math.cos(latitude)
+
+
+@kernel
+def merge(state: State) -> None:
+    """Fuse the members of each share, and all IMUs into the last row of the groups."""
+    blocks, groups, members = state.blocks, state.groups, state.members
+    shares = members.shape[0]
+    if members[shares - 1, 1] > 1:
+        for b in range(blocks.shape[0]):
+            fuse.project_to_origin(blocks[b], state.clock[1])
+    for s in range(shares):
+        fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
+    if shares > 1:
+        fuse.fuse_states(blocks, 0, members[shares - 1, 1], groups[shares])
+
+
+@kernel
+def aid_by_position(state: State, plan: Plan, fix: Array, innovation: Array) -> int:
+    """Update every share by a GNSS position; return what became of it."""
+    geodetic = state.near[0] != 0.0
+    nis = 0.0
+    for s in range(state.members.shape[0]):
+        g, m = state.groups[s], state.measurements[s]
+        first, last = state.members[s, 0], state.members[s, 1]
+        metres = g[share.METRIC : share.METRIC + 3]
+        earth.metric(g[share.POSITION : share.POSITION + 3], geodetic, metres)
+        gnss.position_design(g, m)
+        gnss.position_residuals(state.blocks, first, last, fix, metres, geodetic, m)
+        for a in range(3):
+            m[kalman.R + a] = fix[6 + a]
+        kalman.gain(g, m)
+        nis += kalman.normalized_innovation_squared(m) / state.members.shape[0]
+    _record(state, nis, innovation)
+    status = ACCEPTED
+    if not nis <= plan.gate_limit:
+        state.counters[1] += 1
+        if state.counters[1] <= plan.reopen_after:
+            return REJECTED
+        _reopen(state)
+        status = REOPENED
+    state.counters[1] = 0
+    _correct(state)
+    return status
+
+
+@kernel
+def aid_by_velocity(state: State, plan: Plan, fix: Array) -> bool:
+    """Update every share by a GNSS velocity; return whether the gate let it pass."""
+    nis = 0.0
+    for s in range(state.members.shape[0]):
+        g, m = state.groups[s], state.measurements[s]
+        w = state.blocks[state.members[s, 0] // LANES]
+        gnss.velocity_design(g, m, w[bank.EARTH_RATE], w[bank.EARTH_RATE + LANES])
+        gnss.velocity_residuals(state.blocks, state.members[s, 0], state.members[s, 1], fix, state.clock[1], m)
+        for a in range(3):
+            m[kalman.R + a] = fix[9 + a]
+        kalman.gain(g, m)
+        nis += kalman.normalized_innovation_squared(m) / state.members.shape[0]
+    if not nis <= plan.gate_limit:
+        return False
+    _correct(state)
+    return True
+
+
+@kernel
+def _record(state: State, nis: float, innovation: Array) -> None:
+    shares = state.members.shape[0]
+    for a in range(3):
+        innovation[a] = 0.0
+        innovation[3 + a] = 0.0
+        for s in range(shares):
+            innovation[a] += state.measurements[s, kalman.RESIDUAL + a] / shares
+            innovation[3 + a] += state.measurements[s, kalman.S + 4 * a] / shares
+    innovation[6] = nis
+
+
+@kernel
+def _reopen(state: State) -> None:
+    """Let the position variance grow by the squared residual, so that the fix is believed."""
+    for s in range(state.members.shape[0]):
+        g, m = state.groups[s], state.measurements[s]
+        for a in range(3):
+            g[share.P + a * (share.STRIDE + 1)] += m[kalman.RESIDUAL + a] ** 2
+        kalman.gain(g, m)
+
+
+@kernel
+def _correct(state: State) -> None:
+    for s in range(state.members.shape[0]):
+        g, m = state.groups[s], state.measurements[s]
+        first, last = state.members[s, 0], state.members[s, 1]
+        kalman.update_covariance(g, m)
+        gnss.residuals_to_corrections(state.blocks, first, last, m)
+        fuse.correct_members(state.blocks, first, last, g[share.METRIC : share.METRIC + 3])
+    for b in range(state.blocks.shape[0]):
+        strapdown.update_matrix(state.blocks[b])
+    merge(state)
+
+
+@kernel
+def aid(state: State, plan: Plan, inputs: Inputs, outputs: Outputs) -> None:
+    """Apply the next fix to the state as it is."""
+    j = state.counters[0]
+    state.counters[0] += 1
+    fix = inputs.fixes[j]
+    status = aid_by_position(state, plan, fix, outputs.innovations[j])
+    if status != REJECTED and fix[9] > 0.0 and not aid_by_velocity(state, plan, fix):
+        status += VELOCITY_REJECTED
+    outputs.fix_status[j] = status
+
+
+@kernel
+def load(state: State, plan: Plan, raw: Array, interval: float) -> None:
+    """Put the measured increments of one epoch, (6, N), into the lanes."""
+    if plan.virtual:
+        fuse.average_increments(raw, interval, plan.to_origin, state.before, state.blocks)
+        return
+    for k in range(6):
+        for i in range(raw.shape[1]):
+            state.blocks[i // LANES, bank.RAW_DTHETA + k * LANES + i % LANES] = raw[k, i]
+
+
+@kernel
+def step(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, k: int, work: tuple[Array, Array] | None) -> None:
+    """Take epoch k: a fix inside the interval splits it."""
+    begin, end = inputs.time[k - 1], inputs.time[k]
+    interval = end - begin
+    load(state, plan, inputs.increments[k], interval)
+    now = begin
+    fixes = inputs.fix_time.shape[0]
+    while state.counters[0] < fixes and inputs.fix_time[state.counters[0]] < end - plan.gnss_snap:
+        t = inputs.fix_time[state.counters[0]]
+        if t > now + plan.gnss_snap:
+            propagate(state, plan, (t - now) / interval, t - now, work)
+            now = t
+        aid(state, plan, inputs, outputs)
+    propagate(state, plan, (end - now) / interval, end - now, work)
+    while state.counters[0] < fixes and inputs.fix_time[state.counters[0]] <= end + plan.gnss_snap:
+        aid(state, plan, inputs, outputs)
+
+
+@kernel
+def write(state: State, plan: Plan, outputs: Outputs, k: int, time: float) -> None:
+    """Write the merged state and its variances; the variance of several shares is their mean."""
+    g = state.groups[-1]
+    row, variance = outputs.states[k], outputs.variances[k]
+    for i in range(10):
+        row[i] = g[share.POSITION + i]
+    shares = state.members.shape[0]
+    for i in range(12):
+        variance[i] = 0.0
+    for s in range(shares):
+        p = state.groups[s]
+        for i in range(6):
+            variance[i] += p[share.P + i * (share.STRIDE + 1)] / shares
+        n = 6
+        for i in range(6, 9):
+            for j in range(i, 9):
+                variance[n] += p[share.P + i * share.STRIDE + j] / shares
+                n += 1
+    if (k - 1) % plan.log_every == 0:
+        _log(state, outputs, time)
+
+
+@kernel
+def _log(state: State, outputs: Outputs, time: float) -> None:
+    row = state.counters[2]
+    state.counters[2] += 1
+    outputs.log_time[row] = time
+    for s in range(state.members.shape[0]):
+        g = state.groups[s]
+        for i in range(state.members[s, 0], state.members[s, 1]):
+            for k in range(12):
+                outputs.log[row, 0, k, i] = state.blocks[i // LANES, bank.ERRORS + k * LANES + i % LANES]
+                outputs.log[row, 1, k, i] = math.sqrt(g[share.P + (9 + k) * (share.STRIDE + 1)])
+
+
+@kernel
+def run_epochs(
+    state: State,
+    plan: Plan,
+    inputs: Inputs,
+    outputs: Outputs,
+    first: int,
+    last: int,
+    work: tuple[Array, Array] | None,
+) -> None:
+    """Take epochs first ... last - 1; the first of a recording is 1, since epoch 0 is the start."""
+    for k in range(first, last):
+        step(state, plan, inputs, outputs, k, work)
+        write(state, plan, outputs, k, inputs.time[k])

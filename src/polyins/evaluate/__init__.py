@@ -1,0 +1,1 @@
+"""How good a solution is: errors against a reference, outages, drift, consistency."""

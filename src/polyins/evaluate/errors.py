@@ -1,0 +1,154 @@
+"""A solution minus its reference, at the reference's point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.evaluate.attitude import angular_rate, euler_angles, rotation_matrices, wrap
+from polyins.evaluate.local_level import metres_per_unit
+from polyins.recording import Reference
+from polyins.rig import Vector
+from polyins.solution import Solution
+
+Array = NDArray[np.float64]
+
+LONGEST_BRIDGED_GAP = 5.0
+"""in median intervals of the reference"""
+ROUNDING_S = 1e-6
+"""what time stamps such as GPS seconds of the week are exact to"""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Solution minus reference at the E epochs of the solution that the reference covers."""
+
+    time: Array
+    """s, shape (E,)"""
+    position: Array
+    """m north, east, down, shape (E, 3)"""
+    velocity: Array | None
+    """m/s north, east, down, shape (E, 3); None: the reference has none"""
+    attitude: Array | None
+    """roll, pitch, heading, rad in [-pi, pi), shape (E, 3); None: the reference has none"""
+    distance: Array
+    """m travelled over ground, along the reference, since the first of these epochs, shape (E,)"""
+    covered: NDArray[np.bool_]
+    """which of the solution's T epochs these are, shape (T,)"""
+
+    @property
+    def horizontal(self) -> Array:
+        """Horizontal position error, m, shape (E,)."""
+        return np.hypot(self.position[:, 0], self.position[:, 1])
+
+    @property
+    def epochs_without_reference(self) -> int:
+        """How many epochs of the solution were left out."""
+        return int(np.count_nonzero(~self.covered))
+
+    def statistics(self) -> dict[str, float | None]:
+        """Return the figures over all epochs; None where there is nothing to compute one from."""
+        attitude = [None] * 3 if self.attitude is None else list(np.degrees(self.attitude).T)
+        return {
+            "horizontal_rms_m": rms(self.horizontal),
+            "horizontal_max_m": float(np.max(self.horizontal)) if self.time.size else None,
+            "vertical_rms_m": rms(self.position[:, 2]),
+            **{f"{angle}_rmse_deg": rms(error) for angle, error in zip(ANGLES, attitude, strict=True)},
+        }
+
+
+ANGLES = ("roll", "pitch", "heading")
+
+
+def rms(values: Array | None) -> float | None:
+    """Return the root mean square; None of nothing."""
+    if values is None or values.size == 0:
+        return None
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def compare_to_reference(solution: Solution, reference: Reference) -> Errors:
+    """Move the solution from its own point to the reference's and subtract the reference.
+
+    The reference is interpolated linearly to the solution's epochs (angles the shorter way round), neither beyond its
+    ends nor across gaps of more than five of its median intervals; epochs without reference are left out. Position is
+    p + D^-1 C l, velocity v + C (w x l) with l = reference.lever_arm - solution.point and w from the differences of
+    the solution's own attitudes.
+
+    Raises InputError if the reference has fewer than two epochs or its times do not increase.
+    """
+    place = _Places.of(reference.time, solution.time)
+    time = solution.time[place.covered]
+    attitude = solution.attitude[place.covered]
+    lever_arm = reference.lever_arm - solution.point
+
+    angles = np.array([False, solution.geodetic, False])  # longitude
+    truth = place.interpolate(reference.position, angles)
+    scale = metres_per_unit(truth, solution.geodetic)
+    difference = solution.position[place.covered] - truth
+    difference[:, angles] = wrap(difference[:, angles])
+    position = difference * scale + rotation_matrices(attitude) @ lever_arm
+
+    velocity = None
+    if reference.velocity is not None:
+        moved = solution.velocity[place.covered] + _lever_arm_velocity(solution, lever_arm)[place.covered]
+        velocity = moved - place.interpolate(reference.velocity)
+    attitude_error = None
+    if reference.attitude is not None:
+        attitude_error = wrap(euler_angles(attitude) - place.interpolate(reference.attitude, np.full(3, True)))
+    travelled = np.interp(time, reference.time, _path_length(reference.position, solution.geodetic))
+    return Errors(time, position, velocity, attitude_error, travelled - travelled[:1], place.covered)
+
+
+def _lever_arm_velocity(solution: Solution, lever_arm: Vector) -> Array:
+    """Return C (w x l), m/s, shape (T, 3)."""
+    if not np.any(lever_arm):
+        return np.zeros_like(solution.velocity)
+    rate = angular_rate(solution.time, solution.attitude)
+    around = np.cross(rate, lever_arm)
+    return np.asarray((rotation_matrices(solution.attitude) @ around[..., None])[..., 0], dtype=float)
+
+
+def _path_length(position: Array, geodetic: bool) -> Array:
+    """Return the metres travelled over ground up to each position, shape (R,)."""
+    step = np.diff(position, axis=0)
+    if geodetic:
+        step[:, 1] = wrap(step[:, 1])
+    north, east, _ = (step * metres_per_unit(position[1:], geodetic)).T
+    return np.concatenate([[0.0], np.cumsum(np.hypot(north, east))])
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the covered epochs lie between those of the reference."""
+
+    covered: NDArray[np.bool_]
+    """shape (T,)"""
+    before: NDArray[np.intp]
+    """index of the reference epoch at or before, shape (E,)"""
+    weight: Array
+    """of the reference epoch after it, shape (E,)"""
+
+    @classmethod
+    def of(cls, known: Array, wanted: Array) -> _Places:
+        """Find the epochs `wanted`, shape (T,), among the epochs `known`, shape (R,)."""
+        step = np.diff(known)
+        if step.size == 0 or not np.all(step > 0.0):
+            raise InputError(f"reference: {known.size} epochs; expected at least two, with increasing times")
+        before = np.clip(np.searchsorted(known, wanted, side="right") - 1, 0, step.size - 1)
+        weight = (wanted - known[before]) / step[before]
+        bridged = step <= LONGEST_BRIDGED_GAP * np.median(step) + ROUNDING_S
+        inside = (weight >= 0.0) & (weight <= 1.0)
+        covered = inside & (bridged[before] | (weight == 0.0) | (weight == 1.0))
+        return cls(covered, before[covered], weight[covered])
+
+    def interpolate(self, values: Array, angles: NDArray[np.bool_] | None = None) -> Array:
+        """Interpolate `values`, shape (R, 3), to shape (E, 3); the columns in `angles` the shorter way round."""
+        first = values[self.before]
+        difference = values[self.before + 1] - first
+        if angles is not None:
+            difference[:, angles] = wrap(difference[:, angles])
+        return first + self.weight[:, None] * difference

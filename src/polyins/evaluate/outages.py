@@ -1,0 +1,70 @@
+"""How far a solution drifts while GNSS is withheld: the accuracy metric of paper A."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.evaluate.errors import ROUNDING_S, Errors, rms
+
+Interval = tuple[float, float]
+
+
+def periodic(first: float, every: float, length: float, begin: float, end: float) -> tuple[Interval, ...]:
+    """Return the outages of `length` s that start at `first`, `first + every`, ... and lie whole in [begin, end].
+
+    Raises InputError if they overlap or have no length.
+    """
+    if not 0.0 < length <= every:
+        raise InputError(f"outages: length {length} s every {every} s; expected 0 < length <= every")
+    skipped = max(0, int(np.ceil((begin - first - ROUNDING_S) / every)))
+    count = int(np.floor((end + ROUNDING_S - length - first) / every)) + 1
+    return tuple((first + k * every, first + k * every + length) for k in range(skipped, count))
+
+
+def outage_statistic(errors: Errors | None, outages: Sequence[Interval]) -> dict[str, object]:
+    """Return the `outages` document: each outage's maximum horizontal error, ends included, and their rms.
+
+    An outage in which no error is known has None, and does not count in the rms.
+    """
+    each = [_maximum(errors, outage) for outage in outages]
+    known = np.array([value for value in each if value is not None])
+    return {
+        "count": len(outages),
+        "length_s": _common_length(outages),
+        "horizontal_max_rms_m": rms(known),
+        "each_m": each,
+    }
+
+
+def partly_covered(errors: Errors, outages: Sequence[Interval]) -> list[Interval]:
+    """Return the outages in part of which no error is known: their maxima may be too small."""
+    if errors.time.size < 2:
+        return list(outages)
+    longest = 5.0 * float(np.median(np.diff(errors.time)))
+    return [outage for outage in outages if _longest_gap(errors.time, outage) > longest]
+
+
+def _maximum(errors: Errors | None, outage: Interval) -> float | None:
+    if errors is None:
+        return None
+    inside = errors.horizontal[_within(errors.time, outage)]
+    return float(np.max(inside)) if inside.size else None
+
+
+def _within(time: NDArray[np.float64], outage: Interval) -> slice:
+    begin, end = outage
+    return slice(*np.searchsorted(time, [begin - ROUNDING_S, end + ROUNDING_S]))
+
+
+def _longest_gap(time: NDArray[np.float64], outage: Interval) -> float:
+    begin, end = outage
+    return float(np.max(np.diff([begin, *time[_within(time, outage)], end])))
+
+
+def _common_length(outages: Sequence[Interval]) -> float | None:
+    lengths = {round(end - begin, 6) for begin, end in outages}
+    return lengths.pop() if len(lengths) == 1 else None

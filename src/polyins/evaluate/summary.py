@@ -1,0 +1,177 @@
+"""The documents that `run` and `compare` print: every figure of a run, null where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins import __version__
+from polyins.evaluate.consistency import consistency
+from polyins.evaluate.drift import drift
+from polyins.evaluate.errors import Errors, compare_to_reference, rms
+from polyins.evaluate.outages import Interval, outage_statistic, partly_covered
+from polyins.recording import Reference
+from polyins.solution import Innovations, Solution
+
+Array = NDArray[np.float64]
+Document = dict[str, Any]
+"""what `json.dumps` takes, with None instead of NaN"""
+
+NO_FIGURES = dict.fromkeys(
+    ("horizontal_rms_m", "horizontal_max_m", "vertical_rms_m", "roll_rmse_deg", "pitch_rmse_deg", "heading_rmse_deg")
+)
+
+
+def summarize(solution: Solution, reference: Reference | None, outages: Sequence[Interval] = ()) -> Document:
+    """Return the `run` document of one solution.
+
+    Raises InputError if the reference cannot be compared with.
+    """
+    errors = None if reference is None else compare_to_reference(solution, reference)
+    epochs = solution.time.size
+    document = {
+        "polyins": __version__,
+        "method": solution.method,
+        "imus": len(solution.imu_names),
+        "rate_hz": 1.0 / np.median(np.diff(solution.time)) if epochs > 1 else None,
+        "duration_s": solution.time[-1] - solution.time[0] if epochs else 0.0,
+        "epochs": epochs,
+        "filter_s": solution.filter_s,
+        "us_per_epoch": 1e6 * solution.filter_s / epochs if epochs else None,
+        "first_call_s": solution.first_call_s,
+        "reference": NO_FIGURES if errors is None else errors.statistics(),
+        "outages": outage_statistic(errors, outages),
+        "drift": drift(errors),
+        "consistency": consistency(solution, errors),
+        "gnss": _gnss(solution.innovations),
+        "start": solution.start,
+        "faults": [],
+        "warnings": [*solution.warnings, *_warnings(solution, errors, outages)],
+    }
+    return {key: plain(value) for key, value in document.items()}
+
+
+def comparison(summaries: Mapping[str, Document], each: Sequence[Document]) -> Document:
+    """Return the `compare` document of the summaries of the array methods and of each IMU alone.
+
+    A single IMU's figures are the root mean square (of maxima the maximum, of times the mean) over all IMUs. The ratio
+    divides that figure by a method's: the outage statistic, or without outages the horizontal rms (paper A, section
+    IV). The time ratio divides the method's time per epoch by a single IMU's.
+    """
+    methods = {name: summary for name, summary in summaries.items() if name != "single"}
+    single = pooled(each) if each else None
+    imus = len(each) or max((summary["imus"] for summary in methods.values()), default=1)
+    return {
+        "polyins": __version__,
+        "methods": {**({"single": single} if single else {}), **methods},
+        "ratio_to_single": {name: _ratio(figure(single), figure(summary)) for name, summary in methods.items()},
+        "time_ratio_to_single": {name: _ratio(_cost(summary), _cost(single)) for name, summary in methods.items()},
+        "sqrt_n": float(np.sqrt(imus)),
+    }
+
+
+def pooled(each: Sequence[Document]) -> Document:
+    """Return one `run` document for all IMUs' runs on their own, with the runs themselves under `each`."""
+    first = each[0]
+    return {
+        **first,
+        **{key: _pool([summary[key] for summary in each], np.mean) for key in ("filter_s", "us_per_epoch")},
+        "first_call_s": max(summary["first_call_s"] for summary in each),
+        "reference": {
+            key: _pool([summary["reference"][key] for summary in each], np.max if "_max_" in key else rms)
+            for key in first["reference"]
+        },
+        "outages": _pooled_outages([summary["outages"] for summary in each]),
+        **{key: _means([summary[key] for summary in each]) for key in ("drift", "consistency")},
+        "gnss": {
+            **_means([{key: summary["gnss"][key] for key in ("fixes", "rejected", "reopened")} for summary in each]),
+            "rejected_times_s": sorted({time for summary in each for time in summary["gnss"]["rejected_times_s"]}),
+        },
+        "warnings": list(dict.fromkeys(warning for summary in each for warning in summary["warnings"])),
+        "each": list(each),
+    }
+
+
+def figure(summary: Document | None) -> float | None:
+    """Return the figure that methods are compared by, m: the outage statistic, or else the horizontal rms."""
+    if summary is None:
+        return None
+    of_outages: float | None = summary["outages"]["horizontal_max_rms_m"]
+    of_all: float | None = summary["reference"]["horizontal_rms_m"]
+    return of_outages if summary["outages"]["count"] else of_all
+
+
+def plain(value: object) -> Any:
+    """Return `value` as JSON knows it: arrays as lists, NumPy's numbers as Python's, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+def _gnss(innovations: Innovations) -> Document:
+    rejected = ~innovations.accepted
+    return {
+        "fixes": innovations.time.size,
+        "rejected": int(np.count_nonzero(rejected)),
+        "reopened": int(np.count_nonzero(innovations.reopened)),
+        "rejected_times_s": innovations.time[rejected],
+    }
+
+
+def _warnings(solution: Solution, errors: Errors | None, outages: Sequence[Interval]) -> list[str]:
+    found = []
+    broken = np.count_nonzero(~np.isfinite(solution.position).all(axis=1))
+    if broken:
+        found.append(f"the solution is not finite at {broken} of {solution.time.size} epochs: it diverged")
+    if errors is not None:
+        found.extend(_coverage_warnings(errors, outages))
+    return found
+
+
+def _coverage_warnings(errors: Errors, outages: Sequence[Interval]) -> list[str]:
+    found = []
+    if errors.epochs_without_reference:
+        found.append(
+            f"reference: covers {errors.time.size} of {errors.covered.size} epochs; "
+            f"{errors.epochs_without_reference} are left out of the errors"
+        )
+    found.extend(
+        f"outage {begin:.3f} s to {end:.3f} s: solution and reference do not cover all of it; its maximum may be larger"
+        for begin, end in partly_covered(errors, outages)
+    )
+    return found
+
+
+def _pooled_outages(statistics: Sequence[Document]) -> Document:
+    maxima = [statistic["each_m"] for statistic in statistics]
+    return {
+        **statistics[0],
+        "horizontal_max_rms_m": _pool([value for values in maxima for value in values], rms),
+        "each_m": [_pool(values, rms) for values in zip(*maxima, strict=True)],
+    }
+
+
+def _means(parts: Sequence[Document]) -> Document:
+    return {key: _pool([part[key] for part in parts], np.mean) for key in parts[0]}
+
+
+def _pool(values: Sequence[float | None], combine: Callable[[Array], Any]) -> float | None:
+    known = np.array([value for value in values if value is not None])
+    return float(combine(known)) if known.size else None
+
+
+def _cost(summary: Document | None) -> float | None:
+    return None if summary is None else summary["us_per_epoch"]
+
+
+def _ratio(numerator: float | None, denominator: float | None) -> float | None:
+    return numerator / denominator if numerator is not None and denominator else None

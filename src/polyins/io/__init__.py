@@ -1,0 +1,1 @@
+"""One file per format, readers and writers alike."""

@@ -1,0 +1,258 @@
+"""What is looked for in data before anything is computed from them: order, gaps, units, axes, plausible values.
+
+A check raises InputError or returns warnings; the thresholds stand at the top.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.io.rows import ImuRows, Source, Track
+from polyins.recording import Array
+
+Axes = tuple[str, str, str]
+
+GRAVITY_M_S2 = (5.0, 15.0)
+"""The median size of the specific force lies between these on any vehicle."""
+STANDARD_GRAVITY = 9.80665
+MAX_TURN_RAD = 2.0
+MAX_RATE_RAD_S = 50.0
+RATES_HZ = (5.0, 20000.0)
+GAP_INTERVALS = 1.5
+JITTER = 0.2
+UPRIGHT = 0.5
+"""Cosine of the largest angle between up in the array and the mean specific force."""
+MIN_COMMON_S = 2.0
+MAX_STD_M = 10000.0
+
+
+def check_imu(rows: ImuRows, name: str) -> tuple[str, ...]:
+    """Check one IMU's rows, in the sensor's axes, and return warnings.
+
+    Raises InputError for fewer than two rows, NaN, stamps that do not increase, and values whose size shows a wrong
+    unit.
+    """
+    if len(rows.time) < 2:
+        raise InputError(f"{rows.source.path}: {len(rows.time)} row(s); expected at least 2")
+    _check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel})
+    _check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
+    _check_rate(rows)
+    _check_accel_unit(rows)
+    _check_gyro_unit(rows)
+    return (*rows.warnings, *(f"IMU {name}: {text}" for text in _uneven(rows.time)))
+
+
+def check_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> None:
+    """Raise InputError if the mean specific force in array axes does not point up, with axes that would make it so.
+
+    `dvel`: m/s in array axes (forward, right, down), shape (T, 3); `axes` as configured.
+    """
+    force = dvel[1:].sum(axis=0) / (time[-1] - time[0])
+    if -force[2] >= UPRIGHT * np.linalg.norm(force):
+        return
+    raise InputError(
+        f"{place}: IMU {name}: with axes [{', '.join(axes)}] the mean specific force is "
+        f"[{', '.join(f'{f:.1f}' for f in force)}] m/s^2 forward, right, down; expected about [0, 0, -9.8]. "
+        f"Try axes: [{', '.join(upright_axes(axes, force))}]"
+    )
+
+
+def upright_axes(axes: Axes, force: Array) -> Axes:
+    """Return right-handed axes that make the mean specific force point up, as near to `axes` as there are.
+
+    `force`: the mean specific force in array axes as they are now, shape (3,).
+    """
+    now = axes_matrix(axes)
+    sensor_force = now.T @ force
+
+    def rating(proposal: Axes) -> float:
+        matrix = axes_matrix(proposal)
+        # The forward axis is the one to keep, then the right one; both weigh less than any change of what is up.
+        return float(-(matrix @ sensor_force)[2] / np.linalg.norm(force) + 0.01 * (now[:2] * matrix[:2]).sum(1) @ [2, 1])
+
+    return max(right_handed_axes(), key=rating)
+
+
+def right_handed_axes() -> list[Axes]:
+    """Return all 24 ways to name forward, right, down by sensor axes."""
+    signed = [(*order,) for order in permutations("xyz")]
+    named = [
+        (first + order[0], second + order[1], third + order[2])
+        for order in signed
+        for first, second, third in product(("", "-"), repeat=3)
+    ]
+    return [axes for axes in named if np.linalg.det(axes_matrix(axes)) > 0.0]
+
+
+def axes_matrix(axes: Axes) -> NDArray[np.float64]:
+    """Return the matrix that maps sensor vectors to the axes named, e.g. `(x, -y, -z)`, shape (3, 3)."""
+    matrix = np.zeros((3, 3))
+    for row, axis in enumerate(axes):
+        matrix[row, "xyz".index(axis[-1])] = -1.0 if axis.startswith("-") else 1.0
+    return matrix
+
+
+def check_track(track: Track, what: str) -> tuple[str, ...]:
+    """Check positions of GNSS or a reference and return warnings.
+
+    Raises InputError for no rows, NaN, stamps that do not increase, coordinates that no place on Earth has.
+    """
+    if not len(track.time):
+        raise InputError(f"{track.source.path}: no rows; expected positions for {what}")
+    _check_finite(track.source, {"time": track.time, "position": track.position})
+    optional = {"velocity": track.velocity, "velocity std": track.velocity_std, "attitude": track.attitude}
+    _check_finite(track.source, {name: block for name, block in optional.items() if block is not None})
+    _check_order(track.source, track.time, "")
+    if track.geodetic:
+        _check_coordinates(track)
+    return track.warnings
+
+
+def check_std(source: Source, std: Array) -> None:
+    """Raise InputError for standard deviations of a position that are not positive metres."""
+    _check_finite(source, {"position std": std})
+    for row in np.flatnonzero((std <= 0.0).any(axis=1))[:1]:
+        raise InputError(
+            f"{source.place(int(row))}: position std is {std[row].tolist()} m; expected numbers above zero "
+            "(position_std_m in the configuration takes their place)"
+        )
+    for row in np.flatnonzero((std > MAX_STD_M).any(axis=1))[:1]:
+        raise InputError(f"{source.place(int(row))}: position std is {std[row].tolist()} m; expected metres")
+
+
+def check_common_span(spans: dict[str, tuple[float, float]]) -> tuple[float, float]:
+    """Return the span that all IMUs cover, s; raise InputError if it is shorter than 2 s."""
+    latest = max(spans, key=lambda name: spans[name][0])
+    earliest = min(spans, key=lambda name: spans[name][1])
+    begin, end = spans[latest][0], spans[earliest][1]
+    if end - begin >= MIN_COMMON_S:
+        return begin, end
+    if latest == earliest:
+        raise InputError(f"IMU {latest}: {end - begin:.3f} s of data; expected at least {MIN_COMMON_S:g} s")
+    raise InputError(
+        f"IMU {latest} begins at {begin:.3f} s and IMU {earliest} ends at {end:.3f} s; expected at least "
+        f"{MIN_COMMON_S:g} s in common (clock_offset_s shifts a clock)"
+    )
+
+
+def check_within(source: Source, what: str, time: Array, span: tuple[float, float]) -> tuple[str, ...]:
+    """Return a warning if part of a stream lies outside the IMUs' span; raise InputError if all of it does."""
+    inside = (time >= span[0]) & (time <= span[1])
+    if not inside.any():
+        raise InputError(
+            f"{source.path}: {what} covers {time[0]:.3f} to {time[-1]:.3f} s, the IMUs {span[0]:.3f} to "
+            f"{span[1]:.3f} s; expected the same clock (clock_offset_s shifts it; GPS time is 18 s ahead of UTC)"
+        )
+    if inside.all():
+        return ()
+    count = int(np.sum(~inside))
+    return (f"{source.path}: {count} of {len(time)} {what} rows lie outside the IMUs' span and are not used",)
+
+
+def _check_finite(source: Source, blocks: dict[str, Array]) -> None:
+    for name, block in blocks.items():
+        bad = ~np.isfinite(block)
+        for row in np.flatnonzero(bad if block.ndim == 1 else bad.any(axis=1))[:1]:
+            raise InputError(f"{source.place(int(row))}: {name} is missing or not a number; expected a number")
+
+
+def _check_order(source: Source, time: Array, remedy: str) -> None:
+    steps = np.diff(time)
+    if np.all(steps > 0.0):
+        return
+    row = int(np.argmax(steps <= 0.0)) + 1
+    if steps[row - 1] == 0.0:
+        count = int(np.sum(steps == 0.0))
+        raise InputError(
+            f"{source.place(row)}: time {time[row]:.6f} s is repeated ({count} in the file); expected increasing "
+            f"times{remedy}"
+        )
+    raise InputError(
+        f"{source.place(row)}: time {time[row]:.6f} s follows {time[row - 1]:.6f} s; expected increasing times{remedy}"
+    )
+
+
+def _check_rate(rows: ImuRows) -> None:
+    rate = float(1.0 / np.median(np.diff(rows.time)))
+    if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
+        raise InputError(
+            f"{rows.source.path}: {rate:.4g} rows per second of the stamps; expected {RATES_HZ[0]:g} to "
+            f"{RATES_HZ[1]:g} for an IMU: is the unit of time (s, ms, us, ns) right?"
+        )
+
+
+def _check_accel_unit(rows: ImuRows) -> None:
+    step = float(np.median(np.diff(rows.time)))
+    size = float(np.median(np.linalg.norm(rows.dvel, axis=1))) / step
+    if _like_gravity(size):
+        return
+    unit, said = rows.accel_unit, f"the specific force comes out at {size:.4g} m/s^2"
+    if unit == "m/s" and _like_gravity(size * step):
+        hint = "values look like rates; say unit: m/s^2 (format: table)"
+    elif unit == "m/s" and _like_gravity(size * step * STANDARD_GRAVITY):
+        hint = "values look like rates in g; say unit: g (format: table)"
+    elif unit == "m/s^2" and _like_gravity(size / step):
+        hint = "values look like increments; say unit: m/s"
+    elif unit == "m/s^2" and _like_gravity(size * STANDARD_GRAVITY):
+        hint = "values look like multiples of g; say unit: g"
+    elif unit == "g" and _like_gravity(size / STANDARD_GRAVITY):
+        hint = "values look like m/s^2; say unit: m/s^2"
+    else:
+        hint = "unit, rate or columns are wrong, or gravity was taken out"
+    raise InputError(f"{rows.source.path}: with unit {unit} {said}; expected about 9.8. {hint}")
+
+
+def _like_gravity(size: float) -> bool:
+    return GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1]
+
+
+def _check_gyro_unit(rows: ImuRows) -> None:
+    steps = np.diff(rows.time)
+    turn = np.linalg.norm(rows.dtheta[1:], axis=1)
+    rms = float(np.sqrt(np.mean((turn / steps) ** 2)))
+    largest = int(np.argmax(turn))
+    if turn[largest] <= MAX_TURN_RAD and rms <= MAX_RATE_RAD_S:
+        return
+    other = {"rad/s": "deg/s", "rad": "rad/s or deg/s", "deg": "deg/s", "deg/s": "another"}[rows.gyro_unit]
+    raise InputError(
+        f"{rows.source.place(largest + 1)}: with unit {rows.gyro_unit} the turn in one interval is "
+        f"{turn[largest]:.3g} rad (rms rate {rms:.3g} rad/s); expected at most {MAX_TURN_RAD:g} rad and "
+        f"{MAX_RATE_RAD_S:g} rad/s: is the unit {other}?"
+    )
+
+
+def _check_coordinates(track: Track) -> None:
+    latitude, longitude = track.position[:, 0], track.position[:, 1]
+    wrong = (np.abs(latitude) > np.pi / 2) | (np.abs(longitude) > 2 * np.pi)
+    empty = (latitude == 0.0) & (longitude == 0.0)
+    for row in np.flatnonzero(wrong)[:1]:
+        hint = ": are the values degrees?" if track.angle_unit == "rad" else ": are the columns in this order?"
+        raise InputError(
+            f"{track.source.place(int(row))}: latitude {np.degrees(latitude[row]):.6g} deg, longitude "
+            f"{np.degrees(longitude[row]):.6g} deg; expected at most 90 and 360{hint}"
+        )
+    for row in np.flatnonzero(empty)[:1]:
+        raise InputError(f"{track.source.place(int(row))}: latitude and longitude are 0; expected rows with a fix only")
+
+
+def _uneven(time: Array) -> list[str]:
+    """Describe gaps and jitter of a stream."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    gaps = steps > GAP_INTERVALS * usual
+    texts = []
+    if gaps.any():
+        worst = int(np.argmax(steps))
+        texts.append(
+            f"{int(gaps.sum())} gap(s) in the stamps, the largest {steps[worst]:.4g} s at {time[worst]:.3f} s; "
+            "the motion inside is not known"
+        )
+    spread = float(np.quantile(np.abs(steps[~gaps] - usual), 0.95)) / usual
+    if spread > JITTER:
+        texts.append(f"intervals vary by {100 * spread:.0f} % (95 % of them by less); expected an even rate")
+    return texts
+

@@ -1,0 +1,216 @@
+"""Solutions in Parquet files: the trajectory and the IMU errors, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins import __version__
+from polyins.errors import InputError
+from polyins.evaluate.attitude import euler_angles, euler_variance, quaternions
+from polyins.evaluate.local_level import displacement
+from polyins.evaluate.summary import plain
+from polyins.solution import Innovations, Solution
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Array = NDArray[np.float64]
+
+SOLUTION = "solution.parquet"
+IMU_ERRORS = "imu_errors.parquet"
+METADATA = b"polyins"
+IMU_ERROR_COLUMNS = (
+    *(f"gyro_bias_{axis}_rad_s" for axis in "xyz"),
+    *(f"accel_bias_{axis}_m_s2" for axis in "xyz"),
+    *(f"gyro_scale_{axis}" for axis in "xyz"),
+    *(f"accel_scale_{axis}" for axis in "xyz"),
+)
+_AXES = ("north", "east", "down")
+_LOCAL = tuple(f"{axis}_m" for axis in _AXES)
+_VELOCITY = tuple(f"{axis}_velocity_m_s" for axis in _AXES)
+_EULER = ("roll_deg", "pitch_deg", "heading_deg")
+_POSITION_STD = tuple(f"std_{name}" for name in _LOCAL)
+_VELOCITY_STD = tuple(f"std_{name}" for name in _VELOCITY)
+_PHI_STD = tuple(f"std_phi_{axis}_deg" for axis in _AXES)
+
+
+@contextmanager
+def written_beside(path: Path) -> Iterator[Path]:
+    """Yield a path beside `path` to write to, renamed to `path` at the end and removed on failure."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        yield beside
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def write_solution(solution: Solution, folder: Path) -> None:
+    """Write `solution.parquet` and `imu_errors.parquet` into `folder`, which is made if there is none."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(_columns(solution), _metadata(solution), folder / SOLUTION)
+    _write(_imu_error_columns(solution), {"polyins": __version__}, folder / IMU_ERRORS)
+
+
+def read_solution(path: Path) -> Solution:
+    """Read a solution from its folder or its `solution.parquet`, with the IMU errors if their file lies beside.
+
+    The covariance of the attitude error is known by its diagonal only, and there are no innovations. A file of another
+    program serves if it has the columns; its point is then taken for the array origin, with a warning.
+
+    Raises InputError if there is no such file or it lacks a column.
+    """
+    file = path / SOLUTION if path.is_dir() else path
+    columns, metadata = _read(file)
+    time = _column(columns, "time_s", file)
+    geodetic = not np.all(np.isnan(_column(columns, "latitude_deg", file)))
+    names, error_time, errors = _read_imu_errors(file.with_name(IMU_ERRORS), tuple(metadata.get("imu_names", ())))
+    warnings = tuple(metadata.get("warnings", ()))
+    if "point" not in metadata:
+        warnings += (f"{file}: does not say which point it describes; the array origin is assumed",)
+    phi_variance = np.radians(_table(columns, _PHI_STD, file)) ** 2
+    return Solution(
+        method=metadata.get("method", file.stem),
+        geodetic=geodetic,
+        time=time,
+        position=_position(columns, geodetic, metadata, file),
+        velocity=_table(columns, _VELOCITY, file),
+        attitude=quaternions(np.radians(_table(columns, _EULER, file))),
+        position_variance=_table(columns, _POSITION_STD, file) ** 2,
+        velocity_variance=_table(columns, _VELOCITY_STD, file) ** 2,
+        phi_covariance=np.insert(phi_variance, [1, 1, 2], 0.0, axis=1),
+        point=np.array(metadata.get("point", [0.0, 0.0, 0.0])),
+        imu_names=names,
+        imu_error_time=error_time,
+        imu_errors=errors,
+        imu_error_std=np.full_like(errors, np.nan),
+        innovations=_no_innovations(),
+        start=metadata.get("start", {}),
+        filter_s=metadata.get("filter_s", 0.0),
+        first_call_s=metadata.get("first_call_s", 0.0),
+        warnings=warnings,
+    )
+
+
+def _columns(solution: Solution) -> dict[str, Array | None]:
+    euler = euler_angles(solution.attitude)
+    euler_std = np.degrees(np.sqrt(euler_variance(euler, solution.phi_covariance)))
+    degrees = np.degrees(euler)
+    degrees[:, 2] %= 360.0
+    latitude, longitude = np.degrees(solution.position[:, :2]).T if solution.geodetic else (None, None)
+    local = displacement(solution.position, solution.position[0], solution.geodetic)
+    phi_std = np.degrees(np.sqrt(solution.phi_covariance[:, [0, 3, 5]]))
+    return {
+        "time_s": solution.time,
+        "latitude_deg": latitude,
+        "longitude_deg": longitude,
+        "height_m": solution.position[:, 2],
+        **_named(_VELOCITY, solution.velocity),
+        **_named(_EULER, degrees),
+        **_named(_POSITION_STD, np.sqrt(solution.position_variance)),
+        **_named(_VELOCITY_STD, np.sqrt(solution.velocity_variance)),
+        **_named(tuple(f"std_{name}" for name in _EULER), euler_std),
+        **_named(_PHI_STD, phi_std),
+        **_named(_LOCAL, local),
+    }
+
+
+def _named(names: tuple[str, ...], values: Array) -> dict[str, Array]:
+    return dict(zip(names, values.T, strict=True))
+
+
+def _imu_error_columns(solution: Solution) -> dict[str, Any]:
+    import pyarrow as pa
+
+    epochs, imus, _ = solution.imu_errors.shape
+    index = pa.array(np.tile(np.arange(imus, dtype=np.int32), epochs))
+    return {
+        "time_s": np.repeat(solution.imu_error_time, imus),
+        "imu": pa.DictionaryArray.from_arrays(index, pa.array(solution.imu_names, pa.string())),
+        **_named(IMU_ERROR_COLUMNS, solution.imu_errors.reshape(-1, 12)),
+    }
+
+
+def _metadata(solution: Solution) -> dict[str, object]:
+    return {
+        "polyins": __version__,
+        "method": solution.method,
+        "point": solution.point,
+        "origin": solution.position[0],
+        "imu_names": solution.imu_names,
+        "start": solution.start,
+        "filter_s": solution.filter_s,
+        "first_call_s": solution.first_call_s,
+        "warnings": solution.warnings,
+    }
+
+
+def _write(columns: Mapping[str, Any], metadata: Mapping[str, object], path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rows = len(columns["time_s"])
+    arrays = {
+        name: pa.nulls(rows, pa.float64()) if values is None else pa.array(values) for name, values in columns.items()
+    }
+    table = pa.table(arrays).replace_schema_metadata({METADATA: json.dumps(plain(metadata))})
+    with written_beside(path) as beside:
+        # Numbers that never repeat gain nothing from a dictionary; the names of IMUs do.
+        pq.write_table(table, beside, compression="zstd", compression_level=1, use_dictionary=["imu"])
+
+
+def _read(path: Path) -> tuple[pa.Table, dict[str, Any]]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; expected a Parquet file or a folder with {SOLUTION}")
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"{path}: not readable as Parquet ({error})") from None
+    return table, json.loads((table.schema.metadata or {}).get(METADATA, b"{}"))
+
+
+def _column(table: pa.Table, name: str, path: Path) -> Array:
+    if name not in table.column_names:
+        raise InputError(f"{path}: no column {name}; expected the columns of polyins's {path.name}")
+    return np.array(table.column(name).to_numpy(), dtype=float)
+
+
+def _table(table: pa.Table, names: tuple[str, ...], path: Path) -> Array:
+    return np.column_stack([_column(table, name, path) for name in names])
+
+
+def _position(table: pa.Table, geodetic: bool, metadata: Mapping[str, Any], path: Path) -> Array:
+    height = _column(table, "height_m", path)
+    if geodetic:
+        degrees = _table(table, ("latitude_deg", "longitude_deg"), path)
+        return np.column_stack([np.radians(degrees), height])
+    origin = np.array(metadata.get("origin", [0.0, 0.0, 0.0]))
+    return np.column_stack([_table(table, _LOCAL[:2], path) + origin[:2], height])
+
+
+def _read_imu_errors(path: Path, names: tuple[str, ...]) -> tuple[tuple[str, ...], Array, Array]:
+    if not path.is_file():
+        return names, np.zeros(0), np.zeros((0, len(names), 12))
+    table, _ = _read(path)
+    time = _column(table, "time_s", path)
+    present = tuple(dict.fromkeys(table.column("imu").to_pylist()))
+    if not present or time.size % len(present):
+        raise InputError(f"{path}: {time.size} rows of {len(present)} IMUs; expected one row of each IMU per time")
+    errors = _table(table, IMU_ERROR_COLUMNS, path).reshape(-1, len(present), 12)
+    return present, time[:: len(present)], errors
+
+
+def _no_innovations() -> Innovations:
+    none, no_rows, never = np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=bool)
+    return Innovations(none, no_rows, no_rows, none, never, never)

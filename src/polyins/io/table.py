@@ -1,0 +1,167 @@
+"""Tables, CSV or Parquet, whose columns and units the configuration declares; and the tables that polyins writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polyins.errors import InputError
+from polyins.io.columns import Column, column_names, read_columns
+from polyins.io.files import plain_suffix, whole
+from polyins.io.rows import ImuRows, Source, Track, intervals
+from polyins.recording import Array, GnssStream, ImuStream
+from polyins.rig import DEG
+
+if TYPE_CHECKING:
+    from polyins.config import ImuColumns, TrackColumns
+
+STANDARD_GRAVITY = 9.80665
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+RADIANS = {"rad/s": 1.0, "rad": 1.0, "deg/s": DEG, "deg": DEG}
+METRES = {"m/s^2": 1.0, "m/s": 1.0, "g": STANDARD_GRAVITY}
+
+IMU_NAMES = ("time_s", *(f"dtheta_{axis}_rad" for axis in "xyz"), *(f"dvel_{axis}_m_s" for axis in "xyz"))
+GEODETIC_NAMES = ("latitude_deg", "longitude_deg", "height_m")
+LOCAL_NAMES = ("north_m", "east_m", "down_m")
+STD_NAMES = ("std_north_m", "std_east_m", "std_down_m")
+VELOCITY_NAMES = ("north_velocity_m_s", "east_velocity_m_s", "down_velocity_m_s")
+VELOCITY_STD_NAMES = ("std_north_velocity_m_s", "std_east_velocity_m_s", "std_down_velocity_m_s")
+ATTITUDE_NAMES = ("roll_deg", "pitch_deg", "heading_deg")
+
+
+def read_imu(path: str | Path, columns: ImuColumns | None = None, rate_hz: float | None = None) -> ImuRows:
+    """Read the IMU table whose columns are declared, or one that polyins wrote.
+
+    Rates become increments by the length of the interval that ends at the stamp; with `rate_hz` the time is row number
+    / rate and the stamps are ignored. Raises InputError for missing columns and cells that are not numbers.
+    """
+    if columns is None:
+        source, values = read_columns(path, IMU_NAMES)
+        time = np.arange(len(values[0])) / rate_hz if rate_hz else values[0]
+        return ImuRows(source, time, np.column_stack(values[1:4]), np.column_stack(values[4:7]))
+    if columns.time is None and rate_hz is None:
+        raise InputError(f"{path}: neither columns.time nor rate_hz is given; expected one of them")
+    stamp: list[Column] = [] if rate_hz or columns.time is None else [columns.time.name]
+    source, values = read_columns(path, [*columns.gyro.names, *columns.accel.names, *stamp])
+    if rate_hz or columns.time is None:
+        time = np.arange(len(values[0])) / (rate_hz or 1.0)
+    else:
+        time = values[6] * SECONDS[columns.time.unit]
+    gyro, accel = columns.gyro.unit, columns.accel.unit
+    steps = intervals(time)[:, None]
+    return ImuRows(
+        source,
+        time,
+        np.column_stack(values[:3]) * RADIANS[gyro] * (steps if gyro.endswith("/s") else 1.0),
+        np.column_stack(values[3:6]) * METRES[accel] * (1.0 if accel == "m/s" else steps),
+        gyro_unit=gyro,
+        accel_unit=accel,
+    )
+
+
+def read_track(path: str | Path, columns: TrackColumns | None = None) -> Track:
+    """Read positions, and velocity, attitude and standard deviations where declared.
+
+    Without `columns` the table has the names that polyins writes (also those of solution.parquet).
+    """
+    if columns is None:
+        columns = written_columns(path)
+    groups = {
+        "position": columns.position,
+        "std": columns.std,
+        "velocity": columns.velocity,
+        "velocity_std": columns.velocity_std,
+        "attitude": columns.attitude,
+    }
+    given = {name: group for name, group in groups.items() if group is not None}
+    wanted: list[Column] = [columns.time.name, *(name for group in given.values() for name in group.names)]
+    source, values = read_columns(path, wanted)
+    found = {name: np.column_stack(values[1 + 3 * n : 4 + 3 * n]) for n, name in enumerate(given)}
+    return _track(source, values[0] * SECONDS[columns.time.unit], found, columns)
+
+
+def written_columns(path: str | Path) -> TrackColumns:
+    """Return the columns of a table of positions that polyins wrote."""
+    from polyins.config import TrackColumns
+
+    names = set(column_names(path))
+    geodetic = names.issuperset(GEODETIC_NAMES) and not np.isnan(read_columns(path, GEODETIC_NAMES[:1])[1][0]).all()
+    declared: dict[str, object] = {
+        "time": {"name": "time_s"},
+        "position": {"names": GEODETIC_NAMES if geodetic else LOCAL_NAMES}
+        | ({} if geodetic else {"frame": "north-east-down"}),
+    }
+    for group, columns in (
+        ("std", STD_NAMES),
+        ("velocity", VELOCITY_NAMES),
+        ("velocity_std", VELOCITY_STD_NAMES),
+        ("attitude", ATTITUDE_NAMES),
+    ):
+        if names.issuperset(columns):
+            declared[group] = {"names": columns}
+    return TrackColumns.model_validate(declared)
+
+
+def write_imu(path: str | Path, stream: ImuStream) -> None:
+    """Write increments as CSV or Parquet, by the suffix."""
+    _write(path, IMU_NAMES, [stream.time, stream.dtheta, stream.dvel])
+
+
+def write_gnss(path: str | Path, stream: GnssStream, *, geodetic: bool) -> None:
+    """Write positions with their standard deviations, and velocities where there are any, as CSV or Parquet."""
+    if geodetic:
+        names, position = GEODETIC_NAMES, stream.position / [DEG, DEG, 1.0]
+    else:
+        names, position = LOCAL_NAMES, stream.position * [1.0, 1.0, -1.0]
+    columns = ["time_s", *names, *STD_NAMES]
+    values = [stream.time, position, stream.position_std]
+    for extra, block in ((VELOCITY_NAMES, stream.velocity), (VELOCITY_STD_NAMES, stream.velocity_std)):
+        if block is not None:
+            columns += extra
+            values.append(block)
+    _write(path, columns, values)
+
+
+def _track(source: Source, time: Array, found: dict[str, Array], columns: TrackColumns) -> Track:
+    frame = columns.position.frame
+    geodetic = frame == "latitude-longitude-height"
+    vectors = columns.velocity.frame if columns.velocity else "north-east-down"
+    angle_unit = columns.position.unit or "deg"
+    scale = [RADIANS[angle_unit], RADIANS[angle_unit], 1.0] if geodetic else 1.0
+    # Upward and downward components differ by the sign of the third, which std do not have.
+    up_to_down = [1.0, 1.0, -1.0]
+    return Track(
+        source,
+        time,
+        _north_east_up(found["position"], frame) * scale,
+        geodetic=geodetic,
+        position_std=np.abs(_north_east_up(found["std"], frame)) if "std" in found else None,
+        velocity=_north_east_up(found["velocity"], vectors) * up_to_down if "velocity" in found else None,
+        velocity_std=np.abs(_north_east_up(found["velocity_std"], vectors)) if "velocity_std" in found else None,
+        attitude=found["attitude"] * RADIANS[columns.attitude.unit] if columns.attitude else None,
+        angle_unit=angle_unit,
+    )
+
+
+def _north_east_up(values: Array, frame: str) -> Array:
+    """Bring three components given in `frame` into the order north, east, up; geodetic ones are in order."""
+    if frame == "north-east-down":
+        return values * [1.0, 1.0, -1.0]
+    return values[:, [1, 0, 2]] if frame == "east-north-up" else values
+
+
+def _write(path: str | Path, names: Sequence[str], values: Sequence[Array]) -> None:
+    from pyarrow import csv, parquet
+    from pyarrow import table as arrow_table
+
+    rows = np.column_stack(values)
+    table = arrow_table({name: rows[:, n] for n, name in enumerate(names)})
+    if plain_suffix(path) == ".parquet":
+        with whole(path) as beside:
+            parquet.write_table(table, beside)
+    else:
+        with whole(path) as beside:
+            csv.write_csv(table, beside)

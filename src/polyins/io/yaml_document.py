@@ -1,0 +1,105 @@
+"""A YAML 1.2 file as plain Python values that remember their line numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from polyins.errors import InputError
+from polyins.io.files import find, read_text
+
+Key = str | int
+
+
+class Document:
+    """The mapping that a YAML file holds, and where its keys stand."""
+
+    def __init__(self, path: Path, tree: Any, warnings: tuple[str, ...] = ()) -> None:
+        self.path = path
+        self.values: dict[str, Any] = _plain(tree)
+        self.warnings = warnings
+        self._tree = tree
+
+    def place(self, keys: Sequence[Key]) -> str:
+        """Name a value as `file, line 3: imus[0].axes`; a key that is not in the file has the line of its parent."""
+        line = self._line(keys)
+        where = f"{self.path}, line {line}" if line else str(self.path)
+        return f"{where}: {key_path(keys)}" if keys else where
+
+    def _line(self, keys: Sequence[Key]) -> int | None:
+        node, line = self._tree, None
+        for key in keys:
+            try:
+                line = (node.lc.key(key) if isinstance(node, dict) else node.lc.item(key))[0] + 1
+                node = node[key]
+            except (KeyError, IndexError, TypeError, AttributeError):
+                break
+        return line
+
+
+def read_yaml(path: str | Path, *, first_of_duplicates: bool = False) -> Document:
+    """Read a YAML file whose top level is a mapping.
+
+    A key given twice is an error, or with `first_of_duplicates` the first one counts and a warning says so.
+    Raises InputError with the line for anything that is not such a file.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.constructor import DuplicateKeyError
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    found, text = find(path), read_text(path)
+    warnings: tuple[str, ...] = ()
+    try:
+        tree = YAML().load(text)
+    except DuplicateKeyError as error:
+        mark = error.problem_mark
+        message = f"{found}, line {mark.line + 1}: {error.problem.split(' with value')[0].strip()}"
+        if not first_of_duplicates:
+            raise InputError(f"{message}; expected each key once") from error
+        warnings = (f"{message}; the first one counts",)
+        reader = YAML()
+        reader.allow_duplicate_keys = True
+        tree = reader.load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = f", line {mark.line + 1}" if mark else ""
+        raise InputError(f"{found}{line}: {error.problem or error.context}; expected YAML") from error
+    except YAMLError as error:
+        raise InputError(f"{found}: {str(error).splitlines()[0]}; expected YAML") from error
+    if not isinstance(tree, dict):
+        raise InputError(f"{found}: is not a configuration; expected YAML with keys such as imus")
+    return Document(found, tree, warnings)
+
+
+def write_yaml(values: dict[str, Any]) -> str:
+    """Return plain values as YAML text, short lists on one line."""
+    from ruamel.yaml import YAML
+
+    writer = YAML()
+    writer.default_flow_style = None
+    writer.width = 120
+    text = StringIO()
+    writer.dump(values, text)
+    return text.getvalue()
+
+
+def key_path(keys: Sequence[Key]) -> str:
+    """Write keys as a user reads them: `imus[0].noise`."""
+    text = ""
+    for key in keys:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
+    return text
+
+
+def _plain(node: Any) -> Any:
+    """Turn the parser's own types, which carry comments and layout, into Python's."""
+    if isinstance(node, dict):
+        return {str(key): _plain(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_plain(value) for value in node]
+    for kind in (bool, int, float, str):
+        if isinstance(node, kind):
+            return kind(node)
+    return node

@@ -1,0 +1,54 @@
+"""Where the numbers of eight IMUs stand in one block of the bank.
+
+Each name is the offset of the first of eight lanes; vectors and matrices take consecutive fields, row by row.
+"""
+
+from __future__ import annotations
+
+LANES = 8
+
+_fields = 0
+
+
+def _take(count: int) -> int:
+    global _fields
+    offset = _fields * LANES
+    _fields += count
+    return offset
+
+
+# navigation state of each IMU
+POSITION = _take(3)  # latitude rad, longitude rad, height m; or north m, east m, height m
+VELOCITY = _take(3)  # north, east, down, m/s
+QUATERNION = _take(4)  # q_nb, scalar first
+MATRIX = _take(9)  # C_nb, kept in step with the quaternion
+# estimated errors: gyro bias, accelerometer bias, gyro scale, accelerometer scale
+ERRORS = _take(12)
+# measured increments over the whole interval, and the corrected ones over the part that is propagated
+RAW_DTHETA = _take(3)
+RAW_DVEL = _take(3)
+DTHETA = _take(3)
+DVEL = _take(3)
+PREVIOUS_DTHETA = _take(3)
+PREVIOUS_DVEL = _take(3)
+# geometry in array axes, m
+TO_ORIGIN = _take(3)  # from the IMU to the array origin
+TO_ANTENNA = _take(3)  # from the IMU to the GNSS antenna
+WEIGHT = _take(1)  # share in means; the weights of a bank add up to one
+# intermediates of one mechanization: where the earth is evaluated and what it gives
+AT_POSITION = _take(3)
+AT_VELOCITY = _take(3)
+AT_MATRIX = _take(9)
+GRAVITY = _take(1)
+EARTH_RATE = _take(2)  # north, down
+TRANSPORT_RATE = _take(3)
+TO_LATITUDE = _take(1)  # rad (or m on a plane) per metre north
+TO_LONGITUDE = _take(1)
+ROTATION = _take(3)  # rotation vector of the body over the interval
+DVEL_N = _take(3)  # velocity increment of the specific force in n
+# the solution seen at the array origin
+ORIGIN_POSITION = _take(3)
+ORIGIN_VELOCITY = _take(3)
+CORRECTION = _take(21)  # error state of the last update
+
+SIZE = _fields * LANES

@@ -1,0 +1,53 @@
+"""How kernels are compiled: one decorator, one cache folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy.typing as npt
+import platformdirs
+
+PACKAGE = Path(__file__).parents[1]
+COMPILED = ("kernels/*.py", "aiding/*.py", "engine.py")
+
+
+def _cache_folder() -> Path:
+    # Numba's cache does not notice an edit in a callee of another file: a folder per state of the sources does.
+    digest = hashlib.sha256()
+    for pattern in COMPILED:
+        for source in sorted(PACKAGE.glob(pattern)):
+            digest.update(source.read_bytes())
+    root = os.environ.get("POLYINS_CACHE") or platformdirs.user_cache_dir("polyins")
+    return Path(root) / "kernels" / digest.hexdigest()[:16]
+
+
+CACHE_FOLDER = _cache_folder()
+
+Array = npt.NDArray[Any]
+"""An array as kernels take it: float64 unless said otherwise."""
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _compiled(function: F, **options: Any) -> F:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE_FOLDER)
+    try:
+        return cast(F, numba.njit(error_model="numpy", nogil=True, **options)(function))
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def kernel(function: F) -> F:
+    """Compile a function of arrays and numbers, cached on disk."""
+    return _compiled(function, cache=True)
+
+
+def formula(function: F) -> F:
+    """Compile a formula that is inlined into each loop that uses it, so that the loop vectorizes."""
+    return _compiled(function, inline="always")

@@ -1,0 +1,112 @@
+"""Errors against the reference over time, inside the three-sigma bands that the filter states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.evaluate.attitude import euler_angles, euler_variance
+from polyins.report.decimation import kept_for_display, points_per_trace
+from polyins.report.palette import transparent
+from polyins.report.scene import Run, Scene
+from polyins.report.style import finish, shade_outages, stacked
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Errors of one run and their stated standard deviation, shape (T, 3) each, NaN where unknown."""
+
+    run: Run
+    errors: Array
+    std: Array
+
+
+def position_figure(scene: Scene) -> Figure:
+    """Draw the position errors, m."""
+    curves = [Curves(run, _position_errors(run), np.sqrt(run.solution.position_variance)) for run in scene.runs]
+    return _figure(scene, curves, ("north (m)", "east (m)", "down (m)"))
+
+
+def velocity_figure(scene: Scene) -> Figure | None:
+    """Draw the velocity errors, m/s; None if the reference has no velocity."""
+    curves = [
+        Curves(run, run.at_epochs(run.errors.velocity), np.sqrt(run.solution.velocity_variance))
+        for run in scene.runs
+        if run.errors is not None and run.errors.velocity is not None
+    ]
+    return _figure(scene, curves, ("north (m/s)", "east (m/s)", "down (m/s)")) if curves else None
+
+
+def attitude_figure(scene: Scene) -> Figure:
+    """Draw the attitude errors, deg."""
+    curves = [Curves(run, np.degrees(_attitude_errors(run)), _attitude_std_deg(run)) for run in scene.runs]
+    return _figure(scene, curves, ("roll (deg)", "pitch (deg)", "heading (deg)"))
+
+
+def _position_errors(run: Run) -> Array:
+    return run.at_epochs(np.full(3, np.nan) if run.errors is None else run.errors.position)
+
+
+def _attitude_errors(run: Run) -> Array:
+    known = run.errors is not None and run.errors.attitude is not None
+    return run.at_epochs(run.errors.attitude if known else np.full(3, np.nan))
+
+
+def _attitude_std_deg(run: Run) -> Array:
+    euler = euler_angles(run.solution.attitude)
+    return np.degrees(np.sqrt(euler_variance(euler, run.solution.phi_covariance)))
+
+
+def _figure(scene: Scene, curves: Sequence[Curves], rows: Sequence[str]) -> Figure:
+    figure = stacked(rows)
+    points = points_per_trace(3 * len(rows) * len(curves))
+    for row in range(len(rows)):
+        bands = [trace for one in curves for trace in _band(scene, one, row, points)]
+        lines = [_line(scene, one, row, points) for one in curves]
+        figure.add_traces([*bands, *lines], rows=row + 1, cols=1)
+    shade_outages(figure, scene.outages)
+    return finish(figure, height=640)
+
+
+def _line(scene: Scene, curves: Curves, row: int, points: int) -> Any:
+    from plotly.graph_objects import Scatter
+
+    run = curves.run
+    drawn = kept_for_display(curves.errors[:, [row]], points)
+    return Scatter(
+        x=scene.since_start(run.solution.time[drawn]),
+        y=curves.errors[drawn, row].astype(np.float32),
+        name=run.label,
+        legendgroup=run.label,
+        showlegend=row == 0,
+        mode="lines",
+        line={"color": run.colour, "dash": run.dash, "width": 1.4},
+    )
+
+
+def _band(scene: Scene, curves: Curves, row: int, points: int) -> Iterator[Any]:
+    from plotly.graph_objects import Scatter
+
+    run = curves.run
+    drawn = kept_for_display(curves.std[:, [row]], points)
+    for sign, fill in ((1.0, None), (-1.0, "tonexty")):
+        yield Scatter(
+            x=scene.since_start(run.solution.time[drawn]),
+            y=(sign * 3.0 * curves.std[drawn, row]).astype(np.float32),
+            legendgroup=run.label,
+            showlegend=False,
+            mode="lines",
+            line={"color": transparent(run.colour, 0.35), "width": 0.6},
+            fill=fill,
+            fillcolor=transparent(run.colour, 0.10),
+            hoverinfo="skip",
+        )

@@ -1,0 +1,60 @@
+"""The errors that the filter estimated for each IMU."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polyins.report.decimation import kept_for_display, points_per_trace
+from polyins.report.palette import imu_colours
+from polyins.report.scene import Run, Scene
+from polyins.report.style import choose, finish, shade_outages, stacked
+from polyins.rig import DEG, HOUR, MGAL, PPM
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+ROWS = ("gyro bias (deg/h)", "accel. bias (mGal)", "gyro scale (ppm)", "accel. scale (ppm)")
+UNITS = np.repeat([DEG / HOUR, MGAL, PPM, PPM], 3)
+POINTS = 60_000
+
+
+def imu_error_figure(scene: Scene) -> Figure | None:
+    """Draw bias and scale errors by kind and axis, one method at a time; None if there are none."""
+    runs = [run for run in scene.runs if run.solution.imu_error_time.size]
+    if not runs:
+        return None
+    figure = stacked(ROWS, columns=3, column_titles=("x", "y", "z"))
+    points = points_per_trace(12 * sum(len(run.solution.imu_names) for run in runs), POINTS)
+    owners = []
+    for index, run in enumerate(runs):
+        for state in range(12):
+            traces = list(_traces(scene, run, state, points))
+            figure.add_traces(traces, rows=state // 3 + 1, cols=state % 3 + 1)
+            owners += [index] * len(traces)
+    shade_outages(figure, scene.outages, columns=3)
+    finish(figure, height=860)
+    choose(figure, [run.label for run in runs], owners)
+    figure.update_layout(legend={"y": -0.07, "yanchor": "top"}, margin={"t": 40})
+    return figure
+
+
+def _traces(scene: Scene, run: Run, state: int, points: int) -> Iterator[Any]:
+    from plotly.graph_objects import Scatter
+
+    names = run.solution.imu_names
+    for imu, (name, colour) in enumerate(zip(names, imu_colours(len(names)), strict=True)):
+        values = run.solution.imu_errors[:, imu, state] / UNITS[state]
+        drawn = kept_for_display(values[:, None], points)
+        yield Scatter(
+            x=scene.since_start(run.solution.imu_error_time[drawn]),
+            y=values[drawn].astype(np.float32),
+            name=escape(name),
+            legendgroup=escape(name),
+            showlegend=state == 0,
+            mode="lines",
+            line={"color": colour, "width": 1.6 if len(names) <= 4 else 1.0},
+        )

@@ -1,0 +1,41 @@
+"""Each outage's maximum horizontal error, side by side for the methods."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from polyins.report.scene import Run, Scene
+from polyins.report.style import finish
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+def outage_figure(scene: Scene) -> Figure | None:
+    """Draw the bars; None without outages or without a figure for any of them."""
+    from plotly.graph_objects import Bar, Figure
+
+    if not any(value is not None for run in scene.runs for value in run.summary["outages"]["each_m"]):
+        return None
+    intervals = [f"{begin:.1f} s to {end:.1f} s" for begin, end in scene.outages]
+    bars = [
+        Bar(
+            x=list(range(1, len(intervals) + 1)),
+            y=run.summary["outages"]["each_m"],
+            name=_label(run),
+            marker={"color": run.colour, "line": {"width": 0}},
+            customdata=intervals,
+            hovertemplate="%{y:.2f} m<br>outage %{x}, %{customdata}",
+        )
+        for run in scene.runs
+    ]
+    figure = finish(Figure(bars), height=380)
+    figure.update_layout(barmode="group", bargap=0.25)
+    figure.update_xaxes(title_text="outage", tickformat="d", showgrid=False)
+    figure.update_yaxes(title_text="max. horizontal error (m)", rangemode="tozero")
+    return figure
+
+
+def _label(run: Run) -> str:
+    value = run.summary["outages"]["horizontal_max_rms_m"]
+    return run.label if value is None else f"{run.label} (rms {value:.2f} m)"

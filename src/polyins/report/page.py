@@ -1,0 +1,100 @@
+"""The report: one HTML file with every figure of one or more runs, which needs no network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from polyins import __version__
+from polyins.evaluate.summary import Document
+from polyins.io.solution_files import written_beside
+from polyins.recording import Recording
+from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
+from polyins.report.imu_errors import imu_error_figure
+from polyins.report.innovations import innovation_figure
+from polyins.report.outage_bars import outage_figure
+from polyins.report.scene import Scene
+from polyins.report.tables import facts, figures_table, warnings_by_text
+from polyins.report.trajectory import trajectory_figure
+from polyins.solution import Solution
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+SHADED = "Outages are shaded."
+BANDS = "Bands are three times the standard deviation that the filter states."
+
+SECTIONS: tuple[tuple[str, str, str, Callable[[Scene], Figure | None]], ...] = (
+    ("trajectory", "Trajectory", "Metres from the start; drag to zoom, double-click to return.", trajectory_figure),
+    ("outages", "Outages", "The greatest horizontal error inside each GNSS outage.", outage_figure),
+    ("position", "Position errors", f"{BANDS} {SHADED}", position_figure),
+    ("velocity", "Velocity errors", f"{BANDS} {SHADED}", velocity_figure),
+    ("attitude", "Attitude errors", f"{BANDS} {SHADED}", attitude_figure),
+    ("imus", "Estimated IMU errors", f"A click in the legend hides an IMU. {SHADED}", imu_error_figure),
+    (
+        "innovations",
+        "Innovations",
+        "Predicted minus measured position of the antenna, at each fix that the filter was shown. Rejected ones beyond "
+        "the range are drawn at its edge.",
+        innovation_figure,
+    ),
+)
+WIDE = ("imus",)
+"""figures that scroll sideways on a narrow screen"""
+
+
+def write_report(
+    path: Path,
+    runs: Mapping[str, tuple[Solution, Document]],
+    recording: Recording,
+    comparison: Document | None = None,
+) -> None:
+    """Write the report of `runs`, name to solution and `run` document, to `path`.
+
+    With the `compare` document the table shows its figures (of single IMUs those over all) and ratios. Raises
+    InputError if the recording's reference cannot be compared with.
+    """
+    scene = Scene.of(runs, recording, comparison)
+    text = _template().render(
+        title=recording.name,
+        version=__version__,
+        facts=facts(scene),
+        table=figures_table(scene, comparison),
+        warnings=warnings_by_text(scene),
+        sections=_sections(scene),
+        config=recording.config_text,
+        plotly=_plotly_script(),
+        single_is_pooled=comparison is not None and "single" in runs,
+    )
+    with written_beside(path) as beside:
+        beside.write_text(text, encoding="utf-8")
+
+
+def _sections(scene: Scene) -> list[dict[str, Any]]:
+    drawn = ((name, title, caption, draw(scene)) for name, title, caption, draw in SECTIONS)
+    return [
+        {"id": name, "title": title, "caption": caption, "plot": _html(figure, name), "wide": name in WIDE}
+        for name, title, caption, figure in drawn
+        if figure is not None
+    ]
+
+
+def _html(figure: Figure, name: str) -> str:
+    config = {"displaylogo": False, "responsive": True}
+    text: str = figure.to_html(full_html=False, include_plotlyjs=False, div_id=f"plot-{name}", config=config)
+    return text
+
+
+def _plotly_script() -> str:
+    from plotly.offline import get_plotlyjs
+
+    text: str = get_plotlyjs()
+    return text
+
+
+def _template() -> Any:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("polyins", "report")
+    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template("report.html.j2")

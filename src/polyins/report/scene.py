@@ -1,0 +1,88 @@
+"""What the figures draw: the recording and each run with its errors and its colour."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.evaluate.errors import Errors, compare_to_reference
+from polyins.evaluate.summary import Document
+from polyins.recording import Recording
+from polyins.report.palette import method_styles
+from polyins.solution import Solution
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One method's solution, its figures and how it is drawn."""
+
+    name: str
+    solution: Solution
+    summary: Document
+    errors: Errors | None
+    colour: str
+    dash: str
+
+    @property
+    def label(self) -> str:
+        """The name as Plotly takes it, which reads some HTML."""
+        return escape(self.name)
+
+    def at_epochs(self, errors: Array) -> Array:
+        """Spread errors, shape (E, 3), over the solution's epochs, shape (T, 3), with NaN where there is none."""
+        spread = np.full((self.solution.time.size, 3), np.nan)
+        if self.errors is not None:
+            spread[self.errors.covered] = errors
+        return spread
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that one page shows."""
+
+    recording: Recording
+    runs: tuple[Run, ...]
+
+    @classmethod
+    def of(
+        cls, runs: Mapping[str, tuple[Solution, Document]], recording: Recording, comparison: Document | None
+    ) -> Scene:
+        """Compare each run with the recording's reference; a comparison's figures stand in for those of one IMU."""
+        figures = comparison["methods"] if comparison else {}
+        styles = method_styles(list(runs))
+        return cls(
+            recording,
+            tuple(
+                Run(name, solution, figures.get(name, summary), _errors(solution, recording), *style)
+                for (name, (solution, summary)), style in zip(runs.items(), styles, strict=True)
+            ),
+        )
+
+    @property
+    def start(self) -> float:
+        """The first epoch of any run, s: the figures' time zero."""
+        return float(min(run.solution.time[0] for run in self.runs))
+
+    def since_start(self, time: Array) -> NDArray[np.float32]:
+        """Return the time since the start, s."""
+        return np.asarray(time - self.start, dtype=np.float32)
+
+    @property
+    def outages(self) -> list[tuple[float, float]]:
+        """The outages, s since the start."""
+        return [(begin - self.start, end - self.start) for begin, end in self.recording.outages]
+
+    @property
+    def origin(self) -> Array:
+        """The position from which tracks are measured: the first solution's start."""
+        return self.runs[0].solution.position[0]
+
+
+def _errors(solution: Solution, recording: Recording) -> Errors | None:
+    return None if recording.reference is None else compare_to_reference(solution, recording.reference)

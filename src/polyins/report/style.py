@@ -1,0 +1,108 @@
+"""What all figures have in common: fonts, axes, legend, the shading of outages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from polyins.report.palette import OUTAGE
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+INK = "#1F2430"
+TIME_TITLE = "time since start (s)"
+AXES = {
+    "gridcolor": "#E8EBF0",
+    "zerolinecolor": "#C5CBD6",
+    "zerolinewidth": 1,
+    "linecolor": "#C5CBD6",
+    "ticks": "outside",
+    "ticklen": 4,
+    "tickcolor": "#C5CBD6",
+    "automargin": True,
+}
+
+
+def finish(figure: Figure, height: int) -> Figure:
+    """Give the figure the page's look."""
+    figure.update_layout(
+        height=height,
+        font={"family": FONT, "size": 12.5, "color": INK},
+        paper_bgcolor="white",
+        plot_bgcolor="white",
+        margin={"l": 64, "r": 16, "t": 16, "b": 48},
+        legend={"orientation": "h", "x": 0.0, "y": 1.02, "yanchor": "bottom", "groupclick": "togglegroup"},
+        hoverlabel={"font": {"family": FONT}},
+        hovermode="closest",
+    )
+    figure.update_xaxes(**AXES)
+    figure.update_yaxes(**AXES)
+    return figure
+
+
+def stacked(rows: Sequence[str], columns: int = 1, column_titles: Sequence[str] | None = None) -> Figure:
+    """Return an empty figure of rows that share the time axis, each with its title (with the unit) on the left."""
+    from plotly.subplots import make_subplots
+
+    figure = make_subplots(
+        rows=len(rows),
+        cols=columns,
+        shared_xaxes="all",
+        vertical_spacing=0.035,
+        horizontal_spacing=0.07,
+        column_titles=column_titles,
+    )
+    for row, title in enumerate(rows, start=1):
+        figure.update_yaxes(title_text=title, row=row, col=1)
+    figure.update_xaxes(title_text=TIME_TITLE, row=len(rows))
+    return figure
+
+
+def shade_outages(figure: Figure, outages: Sequence[tuple[float, float]], columns: int = 1) -> None:
+    """Shade the outages, s since the start, behind all rows of each column."""
+    figure.update_layout(
+        shapes=[_shade(outage, f"x{column}" if column > 1 else "x") for outage in outages for column in range(1, columns + 1)]
+    )
+
+
+def _shade(outage: tuple[float, float], axis: str) -> dict[str, Any]:
+    begin, end = outage
+    return {
+        "type": "rect",
+        "x0": begin,
+        "x1": end,
+        "xref": axis,
+        "y0": 0.0,
+        "y1": 1.0,
+        "yref": "paper",
+        "fillcolor": OUTAGE,
+        "line": {"width": 0},
+        "layer": "below",
+    }
+
+
+def choose(figure: Figure, labels: Sequence[str], owners: Sequence[int]) -> None:
+    """Add a menu that shows the traces of one choice at a time; `owners` says to which choice each trace belongs."""
+    buttons = [
+        {"label": label, "method": "restyle", "args": [{"visible": [owner == choice for owner in owners]}]}
+        for choice, label in enumerate(labels)
+    ]
+    for trace, owner in zip(figure.data, owners, strict=True):
+        trace.visible = owner == 0
+    if len(labels) > 1:
+        figure.update_layout(
+            updatemenus=[
+                {
+                    "buttons": buttons,
+                    "x": 0.0,
+                    "xanchor": "left",
+                    "y": 1.0,
+                    "yanchor": "bottom",
+                    "pad": {"b": 26},
+                    "bgcolor": "white",
+                    "bordercolor": "#C5CBD6",
+                }
+            ]
+        )

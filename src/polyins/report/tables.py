@@ -1,0 +1,127 @@
+"""The report's words and figures: what was run, the table of the methods, the warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from polyins.evaluate.summary import Document, plain
+from polyins.recording import Recording
+from polyins.report.scene import Run, Scene
+
+Cell = tuple[str, str]
+"""a column's heading and what stands under it"""
+
+
+@dataclass(frozen=True)
+class Table:
+    """The methods' figures as text; columns in which nothing is known are left out."""
+
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, str, tuple[str, ...]], ...]
+    """method, its colour, its figures"""
+
+
+UNKNOWN = "–"
+
+COLUMNS: tuple[tuple[str, int, Callable[[Document], float | None]], ...] = (
+    ("outages, rms of max. (m)", 2, lambda run: run["outages"]["horizontal_max_rms_m"]),
+    ("horizontal rms (m)", 3, lambda run: run["reference"]["horizontal_rms_m"]),
+    ("horizontal max. (m)", 2, lambda run: run["reference"]["horizontal_max_m"]),
+    ("vertical rms (m)", 3, lambda run: run["reference"]["vertical_rms_m"]),
+    ("roll rmse (deg)", 3, lambda run: run["reference"]["roll_rmse_deg"]),
+    ("pitch rmse (deg)", 3, lambda run: run["reference"]["pitch_rmse_deg"]),
+    ("heading rmse (deg)", 3, lambda run: run["reference"]["heading_rmse_deg"]),
+    ("NEES position", 2, lambda run: run["consistency"]["nees_position"]),
+    ("NIS GNSS", 2, lambda run: run["consistency"]["nis_gnss"]),
+    ("time per epoch (µs)", 2, lambda run: run["us_per_epoch"]),
+)
+RATIOS = (("error, single / method", "ratio_to_single"), ("time, method / single", "time_ratio_to_single"))
+
+
+def figures_table(scene: Scene, comparison: Document | None) -> Table:
+    """Return the table of figures, one row for each run."""
+    rows = [_figures(run, comparison) for run in scene.runs]
+    known = [column for column, cells in enumerate(zip(*rows, strict=True)) if {text for _, text in cells} != {UNKNOWN}]
+    headings = tuple(rows[0][column][0] for column in known)
+    lines = ((run.name, run.colour, row) for run, row in zip(scene.runs, rows, strict=True))
+    return Table(
+        headings, tuple((name, colour, tuple(row[column][1] for column in known)) for name, colour, row in lines)
+    )
+
+
+def facts(scene: Scene) -> list[Cell]:
+    """Return what was run, as pairs of a term and its value."""
+    recording, first = scene.recording, scene.runs[0]
+    duration, rate = first.summary["duration_s"], first.summary["rate_hz"]
+    return [
+        ("IMUs", _imus(recording)),
+        ("solution", f"{duration:.1f} s, {first.summary['epochs']:,} epochs at {_number(rate, 1)} Hz"),
+        ("time zero", f"{scene.start:.3f} s"),
+        ("GNSS", _gnss(scene)),
+        ("outages", _outages(first.summary["outages"])),
+        ("reference", _reference(recording)),
+        ("positions", "geodetic (WGS 84)" if recording.geodetic else "local tangent plane, no Earth rate"),
+        *((f"start: {key.replace('_', ' ')}", _value(value)) for key, value in first.solution.start.items()),
+    ]
+
+
+def warnings_by_text(scene: Scene) -> list[tuple[str, str]]:
+    """Return each warning once, with the names of the runs that gave it; no name if all did or it is the recording's."""
+    given: dict[str, list[str]] = {}
+    for run in scene.runs:
+        for text in dict.fromkeys(run.summary["warnings"]):
+            given.setdefault(text, []).append(run.name)
+    named = {text: "" if len(names) == len(scene.runs) else ", ".join(names) for text, names in given.items()}
+    return list({**named, **dict.fromkeys(scene.recording.warnings, "")}.items())
+
+
+def _figures(run: Run, comparison: Document | None) -> list[Cell]:
+    own = [(heading, _number(pick(run.summary), digits)) for heading, digits, pick in COLUMNS]
+    if comparison is None:
+        return own
+    return own + [(heading, _number(comparison[key].get(run.name), 2)) for heading, key in RATIOS]
+
+
+def _number(value: float | None, digits: int) -> str:
+    return UNKNOWN if value is None else f"{value:.{digits}f}"
+
+
+def _imus(recording: Recording) -> str:
+    names = [imu.name for imu in recording.rig.imus]
+    shown = names if len(names) <= 4 else [names[0], names[1], "…", names[-1]]
+    return f"{len(names)} ({', '.join(shown)})"
+
+
+def _gnss(scene: Scene) -> str:
+    gnss = scene.recording.gnss
+    if gnss is None:
+        return "none"
+    rejected = ", ".join(f"{np.count_nonzero(~run.solution.innovations.accepted)} {run.name}" for run in scene.runs)
+    return f"{gnss.time.size:,} fixes; rejected: {rejected}"
+
+
+def _outages(outages: Document) -> str:
+    if not outages["count"]:
+        return "none"
+    length = "" if outages["length_s"] is None else f" of {outages['length_s']:g} s"
+    return f"{outages['count']}{length}"
+
+
+def _reference(recording: Recording) -> str:
+    reference = recording.reference
+    if reference is None:
+        return "none: errors are unknown, bands only"
+    extra = [name for name, part in (("velocity", reference.velocity), ("attitude", reference.attitude)) if part is not None]
+    return f"{', '.join(['position', *extra])}; {reference.time.size:,} epochs"
+
+
+def _value(value: object) -> str:
+    simple = plain(value)
+    if isinstance(simple, float):
+        return f"{simple:.9g}"
+    if isinstance(simple, Sequence) and not isinstance(simple, str):
+        return ", ".join(_value(item) for item in simple)
+    return UNKNOWN if simple is None else str(simple)

@@ -1,0 +1,245 @@
+"""A drivable path on the rotating Earth, smooth enough that its rates and accelerations are exact derivatives.
+
+The velocity points along the body's x axis, so heading is course and pitch is slope. Speed, yaw rate, pitch and roll
+are piecewise polynomials of degree 7 with three continuous derivatives; heading is the integral of the yaw rate,
+position the integral of the velocity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polyins.evaluate.attitude import euler_jacobian, quaternions, rotation_matrices, wrap
+from polyins.rig import DEG
+from polyins.simulate import earth
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+Array = NDArray[np.float64]
+
+START = (30.5278 * DEG, 114.3557 * DEG, 35.0)
+"""Wuhan: latitude rad, longitude rad, height m."""
+
+POSITION_STEP = 0.01  # s; the cubic between such nodes is exact to nanometres
+PICARD_STEPS = 4  # each shrinks the error by distance over Earth radius
+PEAK = 35.0 / 16.0  # of the derivative of the smooth step, over its mean
+
+LONGITUDINAL_LIMIT = 2.0  # m/s^2
+LATERAL_LIMIT = 2.0  # m/s^2
+TURN_RADIUS = 10.0  # m
+SLOPE_STD = 1.5 * DEG
+SLOPE_LIMIT = 4.0 * DEG
+CAMBER_STD = 0.7 * DEG
+ROLL_PER_ACCELERATION = 0.6 * DEG  # per m/s^2; the body leans out of the turn
+
+
+class Curve(Protocol):
+    """A function of time and its derivatives."""
+
+    def __call__(self, time: Array, nu: int = 0) -> Array:
+        """Return the `nu`-th derivative at the times."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The true state of one point of the body."""
+
+    time: Array
+    """s, shape (T,)"""
+    position: Array
+    """latitude rad, longitude rad, ellipsoidal height m, shape (T, 3)"""
+    velocity: Array
+    """m/s north, east, down, shape (T, 3)"""
+    attitude: Array
+    """roll, pitch, heading in [-pi, pi), rad, shape (T, 3)"""
+
+    @property
+    def quaternion(self) -> Array:
+        """q_nb, scalar first, shape (T, 4)."""
+        return quaternions(self.attitude)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Position, attitude and rates of the body at some instants."""
+
+    position: Array
+    """lat rad, lon rad, h m, shape (T, 3)"""
+    velocity: Array
+    """m/s NED, shape (T, 3)"""
+    attitude: Array
+    """roll, pitch, heading, rad, shape (T, 3)"""
+    C_nb: Array
+    """shape (T, 3, 3)"""
+    earth_rate: Array
+    """w_ie in b, rad/s, shape (T, 3)"""
+    angular_rate: Array
+    """w_ib in b, rad/s, shape (T, 3)"""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A path of the array origin."""
+
+    duration: float
+    """s"""
+    static: float
+    """s: length of the standing start"""
+    speed: Curve
+    """m/s along the body's x axis"""
+    roll: Curve
+    """rad"""
+    pitch: Curve
+    """rad, between -pi/2 and pi/2"""
+    heading: Curve
+    """rad, continuous"""
+    position: Curve
+    """lat rad, lon rad, h m: (T,) -> (T, 3)"""
+
+    def truth(self, time: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> Truth:
+        """Return the true state at times, shape (T,), of a point given in the array frame, m, shape (3,).
+
+        The point has its own local level: attitude and velocity are those in the n frame at the point.
+        """
+        motion, lever_arm = self.motion(np.asarray(time, dtype=float)), np.asarray(point, dtype=float)
+        arm = motion.C_nb @ lever_arm
+        swing = (motion.C_nb @ np.cross(motion.angular_rate - motion.earth_rate, lever_arm)[..., None])[..., 0]
+        # local level turns by 1.6e-7 rad per metre: first order is exact
+        turn = earth.transport_rate(motion.position, arm)
+        attitude = motion.attitude - (euler_jacobian(motion.attitude) @ turn[..., None])[..., 0]
+        attitude[:, 2] = wrap(attitude[:, 2])
+        velocity = motion.velocity + swing
+        return Truth(
+            time=np.asarray(time, dtype=float),
+            position=motion.position + earth.displacement(motion.position, arm),
+            velocity=velocity - np.cross(turn, velocity),
+            attitude=attitude,
+        )
+
+    def motion(self, time: Array) -> Motion:
+        """Return position, velocity, attitude and rates of the array origin at times, shape (T,)."""
+        attitude = np.column_stack([self.roll(time), self.pitch(time), self.heading(time)])
+        C_nb = np.ascontiguousarray(rotation_matrices(quaternions(attitude)))
+        position = self.position(time)
+        velocity = self.speed(time)[:, None] * C_nb[:, :, 0]
+        earth_rate = earth.earth_rate(position)
+        level_rate = _to_body(C_nb, earth_rate + earth.transport_rate(position, velocity))
+        angular_rate = level_rate + self._body_rate(time, attitude)
+        return Motion(position, velocity, attitude, C_nb, _to_body(C_nb, earth_rate), angular_rate)
+
+    def _body_rate(self, time: Array, attitude: Array) -> Array:
+        """Return w_nb in b, rad/s, shape (T, 3), from the derivatives of roll, pitch and heading."""
+        roll_rate, pitch_rate, heading_rate = self.roll(time, 1), self.pitch(time, 1), self.heading(time, 1)
+        (sr, sp, _), (cr, cp, _) = np.sin(attitude.T), np.cos(attitude.T)
+        return np.column_stack(
+            [
+                roll_rate - heading_rate * sp,
+                pitch_rate * cr + heading_rate * sr * cp,
+                heading_rate * cr * cp - pitch_rate * sr,
+            ]
+        )
+
+
+def path(
+    speed: Curve,
+    roll: Curve,
+    pitch: Curve,
+    heading: Curve,
+    *,
+    duration: float,
+    static: float = 0.0,
+    start: ArrayLike = START,
+) -> Path:
+    """Return the path that starts at a position (lat rad, lon rad, h m) and moves along its body's x axis."""
+    from scipy.interpolate import CubicSpline
+
+    time = np.linspace(0.0, duration, int(np.ceil(duration / POSITION_STEP)) + 1)
+    p, y = pitch(time), heading(time)
+    velocity = speed(time)[:, None] * np.stack([np.cos(p) * np.cos(y), np.cos(p) * np.sin(y), -np.sin(p)], axis=-1)
+    begin = np.asarray(start, dtype=float)
+    position = np.broadcast_to(begin, (time.size, 3))
+    for _ in range(PICARD_STEPS):
+        integral = CubicSpline(time, earth.displacement(position, velocity)).antiderivative()
+        integral.c[-1] += begin
+        position = integral(time)
+    return Path(duration, static, speed, roll, pitch, heading, integral)
+
+
+def drive(
+    duration: float = 1000.0,
+    *,
+    static: float = 60.0,
+    seed: int | np.random.SeedSequence = 0,
+    start: ArrayLike = START,
+) -> Path:
+    """Return a drive of a road vehicle: a standing start, then turns, slopes and stops.
+
+    `duration` includes the standing start of length `static`, both in s; `start` is latitude rad, longitude rad,
+    ellipsoidal height m. Another seed gives another drive of the same kind.
+    """
+    rng = np.random.default_rng(seed)
+    knots = _plan(duration, static, rng)
+    speed, yaw_rate, pitch, roll = (smooth_steps(knots[:, 0], column) for column in knots[:, 1:].T)
+    heading = yaw_rate.antiderivative()
+    heading.c[-1] += rng.uniform(-np.pi, np.pi)
+    return path(speed, roll, pitch, heading, duration=duration, static=static, start=start)
+
+
+def smooth_steps(time: Array, value: Array) -> PPoly:
+    """Return the curve through the values that stands still at each knot: three derivatives are zero there."""
+    from scipy.interpolate import PPoly
+
+    span, rise = np.diff(time), np.diff(value)
+    flat = np.zeros_like(rise)
+    shape = [-20.0 * rise / span**7, 70.0 * rise / span**6, -84.0 * rise / span**5, 35.0 * rise / span**4]
+    return PPoly(np.stack([*shape, flat, flat, flat, value[:-1]]), time)
+
+
+def _plan(duration: float, static: float, rng: np.random.Generator) -> Array:
+    """Return knots (time, speed, yaw rate, pitch, roll), shape (K, 5), from time 0 beyond the duration.
+
+    Speed and yaw rate change by the same smooth step, so between knots the curvature stays within that of the knots.
+    """
+    rest = np.array([0.0, 0.0, 0.0, *_road(rng)])
+    knots = [rest]
+    if static > 0.0:
+        knots.append(_standing(rest, static))
+    while knots[-1][0] <= duration:
+        for _ in range(rng.integers(5, 14)):
+            knots.append(_leg(knots[-1], rng.uniform(4.0, 16.0), rng))
+        knots.append(_leg(knots[-1], 0.0, rng))
+        knots.append(_standing(knots[-1], rng.uniform(4.0, 15.0)))
+    return np.array(knots)
+
+
+def _standing(knot: Array, length: float) -> Array:
+    """Return the knot at the end of a stop."""
+    later = knot.copy()
+    later[0] += length
+    return later
+
+
+def _leg(last: Array, speed: float, rng: np.random.Generator) -> Array:
+    """Return the next knot of a vehicle that reaches the given speed there."""
+    span = max(rng.uniform(4.0, 9.0), PEAK * abs(speed - last[1]) / LONGITUDINAL_LIMIT)
+    turning = rng.uniform(-1.0, 1.0) * (rng.random() < 0.7)
+    yaw_rate = turning * min(LATERAL_LIMIT / speed, speed / TURN_RADIUS) if speed > 0.0 else 0.0
+    pitch, camber = _road(rng)
+    return np.array([last[0] + span, speed, yaw_rate, pitch, camber - ROLL_PER_ACCELERATION * speed * yaw_rate])
+
+
+def _road(rng: np.random.Generator) -> tuple[float, float]:
+    """Return slope and camber, rad."""
+    slope, camber = rng.normal(0.0, (SLOPE_STD, CAMBER_STD))
+    return float(np.clip(slope, -SLOPE_LIMIT, SLOPE_LIMIT)), float(camber)
+
+
+def _to_body(C_nb: Array, vector: Array) -> Array:
+    """Return vectors of n, shape (T, 3), in b."""
+    return np.asarray(np.einsum("tji,tj->ti", C_nb, vector))
+

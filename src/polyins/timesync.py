@@ -1,0 +1,108 @@
+"""Streams of several IMUs onto one time base, by integrating increments and never by sampling rates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.recording import ImuStream
+
+Array = NDArray[np.float64]
+
+GAP = 3.5
+"""An interval longer than this many nominal ones is a gap: what was measured in it is lost."""
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """Increments of N IMUs over common intervals."""
+
+    time: Array
+    """s, shape (T,)"""
+    increments: Array
+    """dtheta (rad) and dvel (m/s) over the interval that ends at `time`, shape (T, 6, N)"""
+    warnings: tuple[str, ...]
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate: one over the median interval."""
+        return float(1.0 / np.median(np.diff(self.time)))
+
+    def between(self, begin: float, end: float) -> Aligned:
+        """Return the epochs with begin <= time <= end."""
+        first, last = np.searchsorted(self.time, [begin, np.nextafter(end, np.inf)])
+        return Aligned(self.time[first:last], self.increments[first:last], self.warnings)
+
+
+def align(streams: tuple[ImuStream, ...]) -> Aligned:
+    """Bring the streams onto the time stamps of the first one, within their common span.
+
+    The increments of the others are interpolated as running sums, so that no rotation or velocity is lost or counted
+    twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one, the mean
+    of the rates on both sides. Either is a warning. Raises InputError if less than two seconds are common.
+    """
+    time = _common_time(streams)
+    increments = np.empty((len(time), 6, len(streams)))
+    missing = np.zeros((len(time), len(streams)), dtype=bool)
+    warnings: list[str] = []
+    for i, stream in enumerate(streams):
+        values = np.hstack([stream.dtheta, stream.dvel])
+        if len(stream.time) == len(time) and np.array_equal(stream.time, time):
+            increments[:, :, i] = values
+        else:
+            increments[:, :, i] = _resample(stream.time, values, time)
+        gaps = _gaps(stream.time)
+        gaps = [g for g in gaps if g[1] > time[0] and g[0] < time[-1]]
+        for begin, end in gaps:
+            missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
+        if gaps:
+            longest = max(end - begin for begin, end in gaps)
+            warnings.append(f"IMU {stream.name}: {len(gaps)} gaps, the longest {longest:.3f} s at {gaps[0][0]:.3f} s")
+    if missing.any():
+        _bridge(time, increments, missing)
+    return Aligned(time, increments, tuple(warnings))
+
+
+def _common_time(streams: tuple[ImuStream, ...]) -> Array:
+    begin = max(stream.time[0] for stream in streams)
+    end = min(stream.time[-1] for stream in streams)
+    if end - begin < 2.0:
+        spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
+        raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
+    base = streams[0].time
+    return base[(base >= begin) & (base <= end)]
+
+
+def _resample(stamps: Array, values: Array, time: Array) -> Array:
+    """Interpolate the running sum of `values` and return its differences over the intervals of `time`."""
+    edges = np.concatenate([[stamps[0] - np.median(np.diff(stamps))], stamps])
+    sums = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    at = np.concatenate([[time[0] - np.median(np.diff(time))], time])
+    out = np.empty((len(time), values.shape[1]))
+    for k in range(values.shape[1]):
+        out[:, k] = np.diff(np.interp(at, edges, sums[:, k]))
+    return out
+
+
+def _gaps(stamps: Array) -> list[tuple[float, float]]:
+    intervals = np.diff(stamps)
+    where = np.flatnonzero(intervals > GAP * np.median(intervals))
+    return [(float(stamps[k]), float(stamps[k + 1])) for k in where]
+
+
+def _bridge(time: Array, increments: Array, missing: NDArray[np.bool_]) -> None:
+    have = ~missing
+    some = missing.any(axis=1) & have.any(axis=1)
+    for k in np.flatnonzero(some):
+        increments[k][:, missing[k]] = increments[k][:, have[k]].mean(axis=1, keepdims=True)
+    none = np.flatnonzero(~have.any(axis=1))
+    intervals = np.diff(time, prepend=2 * time[0] - time[1])
+    good = np.flatnonzero(have.any(axis=1))
+    for k in none:
+        before = good[good < k][-1:] if (good < k).any() else good[:1]
+        after = good[good > k][:1] if (good > k).any() else good[-1:]
+        rates = [increments[j[0]] / intervals[j[0]] for j in (before, after)]
+        increments[k] = 0.5 * (rates[0] + rates[1]) * intervals[k]
