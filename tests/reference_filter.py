@@ -8,7 +8,7 @@ Error states, 21: position (m, in n), velocity, phi, gyro bias, accelerometer bi
 
     r_hat = r + D^-1 dr,   v_hat = v + dv,   C_hat = (I - phi x) C,   bias_hat = bias - db,   scale_hat = scale - ds
 
-The bias and scale states are what is still missing in the estimates, so the feedback adds them and subtracts the others.
+The bias and scale states are what is still missing in the estimates: the feedback adds them and subtracts the others.
 """
 
 from __future__ import annotations
@@ -422,8 +422,8 @@ def velocity_design(earth: Earth, position: Array, C: Array, rate: Array, arm: A
 class Bank:
     """N navigators that step side by side, all axes parallel to the array's.
 
-    `positions` (N, 3) and `antenna` (3,) are in the array frame, from its origin. With one IMU there is no array to speak
-    of: the fused state is that IMU's own, at its own place.
+    `positions` (N, 3) and `antenna` (3,) are in the array frame, from its origin. With one IMU there is no array to
+    speak of: the fused state is that IMU's own, at its own place.
     """
 
     earth: Earth
@@ -555,10 +555,10 @@ class EnavFusion(Bank):
 def virtual_imu(time: Array, dtheta: Array, dvel: Array, positions: Array) -> tuple[Array, Array]:
     """The mean of raw increments (T, N, 3), moved to the array origin; two arrays of shape (T, 3).
 
-    With l from the IMU to the origin f_origin = f + w x (w x l) + w' x l (paper A, equation 13, whose minus signs belong to
-    the opposite l). All IMUs are taken to turn alike, so the mean arm does for the mean force. The angular acceleration is
-    the difference of two neighbouring mean rates over the time between the middles of their intervals; the first interval
-    has none.
+    With l from the IMU to the origin f_origin = f + w x (w x l) + w' x l (paper A, equation 13, whose minus signs
+    belong to the opposite l). All IMUs are taken to turn alike, so the mean arm does for the mean force. The angular
+    acceleration is the difference of two neighbouring mean rates over the time between the middles of their intervals;
+    the first interval has none.
     """
     arm = -positions.mean(axis=0)
     mean_dtheta, mean_dvel = dtheta.mean(axis=1), dvel.mean(axis=1)
@@ -576,8 +576,8 @@ def virtual_imu(time: Array, dtheta: Array, dvel: Array, positions: Array) -> tu
 def advance(bank: Bank, now: float, then: float, dtheta: Array, dvel: Array, fixes: list[Fix], snap: float) -> None:
     """Go from one IMU epoch to the next, updating at every fix on the way (taken from the front of `fixes`).
 
-    A fix within `snap` of an epoch, or of the fix before it, is used there as it is; any other one splits the increments
-    linearly. What is left after the update is compensated with the new errors.
+    A fix within `snap` of an epoch, or of the fix before it, is used there as it is; any other one splits the
+    increments linearly. What is left after the update is compensated with the new errors.
     """
     while fixes and fixes[0].time < then - snap:
         fix = fixes.pop(0)
@@ -632,10 +632,10 @@ def run(
 ) -> dict[str, Any]:
     """Navigate with one of `METHODS`.
 
-    time (T,) are the ends of the intervals of the raw increments dtheta, dvel (T, N, 3); the start state holds at time[0], so
-    the first increment only serves as the previous one of the second (its interval is taken as long as the second's).
-    positions (N, 3) and antenna (3,) in the array frame. start: at the array origin, or one per IMU, or with one IMU that
-    IMU's. start_std (21,) in the order of the error states. Fixes at or before time[0] are left out.
+    time (T,) are the ends of the intervals of the raw increments dtheta, dvel (T, N, 3); the start state holds at
+    time[0], so the first increment only serves as the previous one of the second (its interval is taken as long as the
+    second's). positions (N, 3) and antenna (3,) in the array frame. start: at the array origin, or one per IMU, or with
+    one IMU that IMU's. start_std (21,) in the order of the error states. Fixes at or before time[0] are left out.
 
     IMU-Fusion has one virtual IMU at the array origin, its noise and the start std of its twelve errors 1/sqrt(N) of
     those given, unless `average_noise` is False.
@@ -717,8 +717,9 @@ def run_single(
 ) -> dict[str, Any]:
     """One IMU with increments (T, 3) and its antenna lever arm; the results of `run` without the axis of IMUs."""
     result = run(
-        "single", time, dtheta[:, None], dvel[:, None], np.zeros((1, 3)), lever_arm, gnss, start, start_std, noise, **options
-    )
+        "single", time, dtheta[:, None], dvel[:, None], np.zeros((1, 3)), lever_arm, gnss, start, start_std, noise,
+        **options,
+    )  # fmt: skip
     return {
         "time": time,
         "position": result["position"],

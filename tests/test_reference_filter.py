@@ -210,43 +210,45 @@ def test_feeding_the_error_back_gives_the_truth() -> None:
     assert np.all(np.abs(error_of(earth, corrected, MOVING)) < 1e-5 * np.abs(dx))
 
 
-def blocks_agree(actual: Array, expected: Array, tolerance: float) -> None:
-    """Compare 3 x 3 block by block, relative to the largest element of the block."""
-    for row_name, rows in NAMES.items():
-        if rows.stop > len(actual):
-            break
-        for column_name, columns in NAMES.items():
-            scale = np.abs(expected[rows, columns]).max()
-            difference = np.abs(actual[rows, columns] - expected[rows, columns]).max()
-            assert difference <= tolerance * scale + 1e-16, f"d{row_name}/d{column_name}: {difference} of {scale}"
+def rows_agree(actual: Array, expected: Array, tolerance: float, floor: Array) -> None:
+    """Compare row by row within each 3 x 3 block: `tolerance` relative to the row's largest element, plus `floor`."""
+    for row in range(len(actual)):
+        for name, columns in NAMES.items():
+            scale = np.abs(expected[row, columns]).max()
+            difference = np.abs(actual[row, columns] - expected[row, columns]).max()
+            allowed = tolerance * scale + floor[row, columns].max()
+            assert difference <= allowed, f"row {row} by {name}: {difference} of {scale}"
 
 
 @pytest.mark.parametrize(
-    ("earth", "tolerance"), [(Sphere(), 2e-3), (Ellipsoid(), 0.015), (FlatEarth(), 2e-3)], ids=["sphere", "wgs84", "flat"]
+    ("earth", "tolerance"),
+    [(Sphere(), 2e-3), (Ellipsoid(), 0.015), (FlatEarth(), 2e-3)],
+    ids=["sphere", "wgs84", "flat"],
 )
 def test_error_dynamics_are_the_derivative_of_the_mechanization(earth: Earth, tolerance: float) -> None:
-    truth = MOVING if not isinstance(earth, FlatEarth) else replace(MOVING, position=np.array([100.0, -50.0, 20.0]))
     dt = 2e-3
     raw = Increment(np.array([0.3, -0.2, 0.5]) * dt, np.array([1.0, 2.0, -9.0]) * dt, dt)
 
     def step(dx: Array) -> State:
-        state = with_error(earth, truth, dx)
+        state = with_error(earth, MOVING, dx)
         current = compensate(raw, state.errors)
         return mechanize(earth, state, state, current, current, rescale_coning=True)
 
     after = step(np.zeros(21))
     jacobian = derivative(lambda dx: error_of(earth, step(dx), after), np.zeros(21), SIZES)
-    current = compensate(raw, truth.errors)
-    F = error_dynamics(earth, truth, current.rate, current.force, np.inf)
-    # Beyond the filter's first order the second one is needed where the first is zero.
-    blocks_agree(jacobian[:9] - np.eye(21)[:9], (F * dt + F @ F * dt**2 / 2.0)[:9], tolerance)
+    current = compensate(raw, MOVING.errors)
+    F = error_dynamics(earth, MOVING, current.rate, current.force, np.inf)
+    # Where the filter's first order is zero, the second one is what there is to see; the third one is not compared.
+    expected = F * dt + F @ F * dt**2 / 2.0
+    third_order = np.linalg.matrix_power(np.abs(F) * dt, 3)
+    rounding = np.repeat([1e-9, 1e-14, 1e-15], 3)[:, None] / SIZES
+    rows_agree((jacobian - np.eye(21))[:9], expected[:9], tolerance, third_order[:9] + rounding)
 
 
 def test_design_matrices_are_the_derivatives_of_the_residuals() -> None:
     earth, arm = Sphere(), np.array([0.4, -0.7, -1.1])
     raw = Increment(np.array([0.6, -0.3, 0.5]) * 0.01, np.zeros(3), 0.01)
-    fix = Fix(0.0, PLACE, np.ones(3), np.array([1.0, 2.0, 3.0]), np.ones(3))
-    sizes = np.where(np.arange(21) < 3, 10.0, SIZES)
+    fix = Fix(0.0, move_position(earth, MOVING, arm), np.ones(3), np.array([1.0, 2.0, 3.0]), np.ones(3))
 
     def position(dx: Array) -> Array:
         return position_residual(earth, with_error(earth, MOVING, dx), arm, fix)
@@ -257,19 +259,13 @@ def test_design_matrices_are_the_derivatives_of_the_residuals() -> None:
 
     rate = compensate(raw, MOVING.errors).rate
     H = velocity_design(earth, MOVING.position, MOVING.C, rate, arm)
-    zero = np.zeros(21)
-    away = position(zero)
-    # At the true position the metres do not change with the position itself.
-    at_home = replace(fix, position=move_position(earth, MOVING, arm))
-    assert np.linalg.norm(away) > 0.0
-    fix = at_home
-    blocks_agree(derivative(position, zero, sizes), position_design(MOVING.C, arm), 1e-5)
-    expected = H.copy()
-    # Compensation divides by 1 + scale: the second-order part of the scale column.
-    expected[:, BG] /= 1.0 + MOVING.errors[6:9]
-    expected[:, SG] /= 1.0 + MOVING.errors[6:9]
-    actual = derivative(velocity, zero, np.where(np.arange(21) < 3, 1e5, sizes))
-    np.testing.assert_allclose(actual, expected, rtol=1e-3, atol=1e-14)
+    # The compensation divides by 1 + scale, which the design takes as one.
+    H[:, BG] /= 1.0 + MOVING.errors[6:9]
+    H[:, SG] /= 1.0 + MOVING.errors[6:9]
+    zero, floor = np.zeros(21), np.full((3, 21), 1e-14)
+    near = np.where(np.arange(21) < 3, 1.0, SIZES)  # metres per radian, too, change with the position
+    rows_agree(derivative(position, zero, near), position_design(MOVING.C, arm), 1e-5, floor + 1e-9 / near)
+    rows_agree(derivative(velocity, zero, SIZES), H, 1e-5, floor * 1e-3 + 1e-14 / SIZES)
 
 
 def test_random_walks_grow_and_biases_keep_their_steady_state() -> None:
@@ -281,7 +277,7 @@ def test_random_walks_grow_and_biases_keep_their_steady_state() -> None:
     for _ in range(count):
         P = predict(earth, P, state, np.zeros(3), np.zeros(3), dt, noise)
     np.testing.assert_allclose(P[PHI, PHI], np.diag(noise.angle_random_walk**2 * dt * count), rtol=1e-12, atol=1e-18)
-    np.testing.assert_allclose(np.diag(P)[9:], first[9:], rtol=1e-4)
+    np.testing.assert_allclose(np.diag(P)[9:], first[9:], rtol=3e-3)  # first order in dt / correlation time
     # Without bias the velocity is a random walk and the position its integral, t^3 / 3.
     no_bias = replace(noise, accel_bias_std=np.zeros(3), accel_scale_std=np.zeros(3))
     P = np.zeros((21, 21))
@@ -324,10 +320,14 @@ def test_rescaled_coning_and_sculling_are_exact_for_rates_linear_in_time(before:
         return float(np.linalg.norm(out.C - C)), float(np.linalg.norm(out.velocity - velocity))
 
     angle, speed = miss(rescale=True)
+    current = over(0.0, now)
+    third_order = np.linalg.norm(current.dtheta) ** 2 * np.linalg.norm(current.dvel) / 6.0
     assert angle < 2e-9
-    assert speed < 1e-5 * now  # third order in the angle: dtheta^2 dvel / 6
+    assert speed < 1.1 * third_order
     if before != now:
-        assert miss(rescale=False)[0] > 10.0 * angle
+        wrong_angle, wrong_speed = miss(rescale=False)
+        assert wrong_angle > 10.0 * angle
+        assert wrong_speed > 3.0 * speed
 
 
 # --- arrays over a simulated truth ------------------------------------------------------------------------------------
@@ -335,11 +335,13 @@ def test_rescaled_coning_and_sculling_are_exact_for_rates_linear_in_time(before:
 
 @dataclass
 class Truth:
-    """An array that swings about a tilted axis through its origin, which drives straight on (flat) or stands (earth)."""
+    """An array that turns about a tilted axis through its origin, which drives straight on (flat) or stands (earth)."""
 
     earth: Earth
     positions: Array
     antenna: Array
+    amplitude: float
+    """of a swing on top of the steady turn, rad"""
 
     def __post_init__(self) -> None:
         self.axis = np.array([0.6, 0.0, 0.8])
@@ -350,7 +352,8 @@ class Truth:
 
     def swing(self, t: float) -> tuple[float, float, float]:
         """Angle, its rate and acceleration."""
-        return 0.4 * np.sin(2.0 * t) + 0.5 * t, 0.8 * np.cos(2.0 * t) + 0.5, -1.6 * np.sin(2.0 * t)
+        a, s, c = self.amplitude, np.sin(2.0 * t), np.cos(2.0 * t)
+        return a * s + 0.5 * t, 2.0 * a * c + 0.5, -4.0 * a * s
 
     def quaternion(self, t: float) -> Array:
         return quaternion_product(self.q0, quaternion_of_vector(self.axis * self.swing(t)[0]))
@@ -375,11 +378,7 @@ class Truth:
 
     def recording(self, rate_hz: float, duration: float) -> tuple[Array, Array, Array]:
         time = np.arange(round(rate_hz * duration)) / rate_hz
-        rows = [
-            [self.increment(t - 1.0 / rate_hz, t, arm) for arm in self.positions]
-            for t in time
-        ]  # fmt: skip
-        data = np.array(rows)
+        data = np.array([[self.increment(t - 1.0 / rate_hz, t, arm) for arm in self.positions] for t in time])
         return time, data[..., :3], data[..., 3:]
 
     def increment(self, start: float, end: float, arm: Array) -> Array:
@@ -390,9 +389,10 @@ class Truth:
 
     def fixes(self, times: Array, with_velocity: bool) -> list[Fix]:
         std = np.full(3, 0.02)
+        velocities = [self.point_velocity(t, self.antenna) if with_velocity else None for t in times]
         return [
-            Fix(t, self.position(t, self.antenna), std, self.point_velocity(t, self.antenna) if with_velocity else None, std)
-            for t in times
+            Fix(t, self.position(t, self.antenna), std, velocity, std)
+            for t, velocity in zip(times, velocities, strict=True)
         ]
 
     def start(self, t: float) -> State:
@@ -402,12 +402,12 @@ class Truth:
 POSITIONS = np.array([[0.3, 0.1, 0.0], [-0.2, 0.25, 0.05], [0.1, -0.3, -0.1], [0.2, 0.2, 0.3]])
 ANTENNA = np.array([0.4, -0.6, -0.9])
 START_STD = np.concatenate([[0.05] * 3, [0.05] * 3, np.array([0.3, 0.3, 0.5]) * DEG, IMU_STD])
-FIX_TIMES = np.array([0.2033, 0.4, 0.6017, 0.80005, 1.2, 1.4021, 1.4022])
+FIX_TIMES = np.array([0.2033, 0.4, 0.6017, 0.8, 1.2, 1.4017, 1.4031])  # between epochs, at epochs, two in one interval
 
 
 @pytest.fixture(scope="module", params=[FlatEarth(), Ellipsoid()], ids=["flat", "wgs84"])
 def truth(request: pytest.FixtureRequest) -> Truth:
-    return Truth(request.param, POSITIONS, ANTENNA)
+    return Truth(request.param, POSITIONS, ANTENNA, amplitude=0.4)
 
 
 @pytest.fixture(scope="module")
@@ -415,32 +415,48 @@ def recording(truth: Truth) -> tuple[Array, Array, Array]:
     return truth.recording(200.0, 1.5)
 
 
-@pytest.mark.parametrize("with_velocity", [False, True], ids=["position", "position-velocity"])
+def worst_off(truth: Truth, result: dict[str, Any]) -> tuple[float, float]:
+    """Largest distance of the fused position (m) and velocity (m/s) from those of the array origin."""
+    expected = np.array([truth.position(t, np.zeros(3)) for t in result["time"]])
+    metres = (result["position"] - expected) * truth.earth.metres_per_unit(truth.origin)
+    return float(np.abs(metres).max()), float(np.abs(result["velocity"] - truth.velocity).max())
+
+
 @pytest.mark.parametrize("method", METHODS[1:])
-def test_the_truth_has_no_residuals(
-    truth: Truth, recording: tuple[Array, Array, Array], method: str, with_velocity: bool
-) -> None:
-    time, dtheta, dvel = recording
+def test_the_truth_has_no_residuals(truth: Truth, recording: tuple[Array, Array, Array], method: str) -> None:
+    fixes = truth.fixes(FIX_TIMES, with_velocity=False)
     result = run(
-        method, time, dtheta, dvel, POSITIONS, ANTENNA, truth.fixes(FIX_TIMES, with_velocity), truth.start(0.0), START_STD,
-        NOISE, earth=truth.earth,
+        method, *recording, POSITIONS, ANTENNA, fixes, truth.start(0.0), START_STD, NOISE, earth=truth.earth
     )  # fmt: skip
     # The differenced angular acceleration of the virtual IMU lags by half an interval.
-    metres = 3e-3 if method == "imu-fusion" else 5e-5
+    tolerance = 1e-4 if method == "imu-fusion" else 1e-5
     assert len(result["innovation"]) == len(FIX_TIMES)
-    assert np.abs(result["innovation"]).max() < metres
-    expected = np.array([truth.position(t, np.zeros(3)) for t in time])
-    off = (result["position"] - expected) * truth.earth.metres_per_unit(truth.origin)
-    assert np.abs(off).max() < metres
-    assert np.abs(result["velocity"] - truth.velocity).max() < 2.0 * metres
-    attitudes = np.array([truth.quaternion(t) for t in time])
-    assert np.abs(np.abs(np.sum(attitudes * result["quaternion"], axis=1)) - 1.0).max() < 1e-8
+    assert np.abs(result["innovation"]).max() < tolerance
+    metres, speed = worst_off(truth, result)
+    assert metres < tolerance
+    assert speed < 5e-4  # the projection's mean rate lags by half an interval, too
+    attitudes = np.array([truth.quaternion(t) for t in result["time"]])
+    assert np.abs(np.abs(np.sum(attitudes * result["quaternion"], axis=1)) - 1.0).max() < 1e-10
+
+
+@pytest.mark.parametrize("method", METHODS[1:])
+@pytest.mark.parametrize("earth", [FlatEarth(), Ellipsoid()], ids=["flat", "wgs84"])
+def test_true_velocities_change_nothing_in_a_steady_turn(earth: Earth, method: str) -> None:
+    turn = Truth(earth, POSITIONS, ANTENNA, amplitude=0.0)
+    fixes = turn.fixes(np.array([0.1033, 0.2, 0.3017]), with_velocity=True)
+    recording = turn.recording(200.0, 0.4)
+    result = run(method, *recording, POSITIONS, ANTENNA, fixes, turn.start(0.0), START_STD, NOISE, earth=earth)
+    assert np.linalg.norm(fixes[0].velocity - turn.velocity) > 0.2  # type: ignore[operator]
+    assert np.abs(result["innovation"]).max() < 2e-6
+    metres, speed = worst_off(turn, result)
+    assert metres < 2e-6
+    assert speed < 1e-5
 
 
 def test_the_virtual_imu_senses_what_the_origin_senses(truth: Truth, recording: tuple[Array, Array, Array]) -> None:
     time, dtheta, dvel = recording
     mean_dtheta, mean_dvel = virtual_imu(time, dtheta, dvel, POSITIONS)
-    origin = Truth(truth.earth, np.zeros((1, 3)), ANTENNA).recording(200.0, 1.5)
+    origin = Truth(truth.earth, np.zeros((1, 3)), ANTENNA, truth.amplitude).recording(200.0, 1.5)
     np.testing.assert_allclose(mean_dtheta, origin[1][:, 0], atol=1e-12)
     dt = time[1] - time[0]
     lag = 3.2 * 0.5 * dt * np.linalg.norm(POSITIONS.mean(axis=0))  # largest jerk times half an interval times the arm
@@ -467,14 +483,16 @@ def noisy(time: Array, seed: int, imus: int) -> tuple[Array, Array]:
     """Raw increments (T, N, 3) of a standing array with noise and biases of its own."""
     rng = np.random.default_rng(seed)
     dtheta = rng.normal(0.0, 1e-4, (len(time), imus, 3)) + rng.normal(0.0, 1e-6, (imus, 3))
-    dvel = rng.normal(0.0, 1e-3, (len(time), imus, 3)) + [0.0, 0.0, -9.79 * 0.005] + rng.normal(0.0, 1e-5, (imus, 3))
+    standing = np.array([0.0, 0.0, -9.79 * 0.005])
+    dvel = rng.normal(0.0, 1e-3, (len(time), imus, 3)) + standing + rng.normal(0.0, 1e-5, (imus, 3))
     return dtheta, dvel
 
 
 TIME = np.arange(300) / 200.0
 HOME = State(np.array([30.46 * DEG, 114.47 * DEG, 20.0]), np.zeros(3), quaternion_of_euler(0.0, 0.0, 1.0))
+NEAR_HOME = HOME.position + np.array([1e-9, -2e-9, 0.01])
 FIXES = [
-    Fix(t, HOME.position + [1e-9, -2e-9, 0.01], np.full(3, 0.02), np.array([0.01, 0.0, 0.0]), np.full(3, 0.05))
+    Fix(t, NEAR_HOME, np.full(3, 0.02), np.array([0.01, 0.0, 0.0]), np.full(3, 0.05))
     for t in (0.3021, 0.7, 1.1033)
 ]
 
@@ -490,9 +508,9 @@ def test_identical_imus_at_one_place_navigate_like_one(method: str) -> None:
     dtheta, dvel = noisy(TIME, seed=1, imus=1)
     arm = np.array([0.136, -0.301, -0.184])
     one = run_single(TIME, dtheta[:, 0], dvel[:, 0], arm, FIXES, HOME, START_STD, NOISE)
+    three = np.repeat(dtheta, 3, axis=1), np.repeat(dvel, 3, axis=1)
     many = run(
-        method, TIME, np.repeat(dtheta, 3, axis=1), np.repeat(dvel, 3, axis=1), np.zeros((3, 3)), arm, FIXES, HOME, START_STD,
-        NOISE, average_noise=False,
+        method, TIME, *three, np.zeros((3, 3)), arm, FIXES, HOME, START_STD, NOISE, average_noise=False
     )  # fmt: skip
     assert_same(many, one, 1e-12)
     deviation = np.abs(many["errors"] - one["errors"][:, None]) / np.sqrt(one["variance"][:, None, 9:])
@@ -552,7 +570,8 @@ def test_a_fix_next_to_an_epoch_is_used_at_that_epoch(offset: float) -> None:
     dtheta, dvel = noisy(TIME, seed=5, imus=1)
 
     def at(time: float) -> dict[str, Any]:
-        return run_single(TIME, dtheta[:, 0], dvel[:, 0], ANTENNA, [replace(FIXES[0], time=time)], HOME, START_STD, NOISE)
+        fixes = [replace(FIXES[0], time=time)]
+        return run_single(TIME, dtheta[:, 0], dvel[:, 0], ANTENNA, fixes, HOME, START_STD, NOISE)
 
     near, exact = at(0.3 + offset), at(0.3)
     np.testing.assert_array_equal(near["position"], exact["position"])

@@ -99,6 +99,7 @@ def build_state(row: Method, recording: Recording, members: list[Member], start:
         _fill_lane(blocks[i // LANES], i % LANES, member, start, c, metres, 1.0 / count)
     for block in blocks:
         engine.strapdown.update_matrix(block)
+        engine.strapdown.update_sensitivity(block)
         engine.strapdown.evaluate_at_own_state(block)
     groups = np.zeros((len(spans) + (len(spans) > 1), share.SIZE))
     for g, (first, last) in zip(groups, spans, strict=False):

@@ -229,8 +229,8 @@ NOISE_GRADES: dict[str, dict[str, float]] = {
 class Noise(Section):
     """How good an IMU is: random walks, and the std and correlation time of its slow errors (Gauss-Markov)."""
 
-    grade: Literal["consumer-mems", "industrial-mems", "tactical"] = "consumer-mems"
-    """fills in what is not given below"""
+    grade: Literal["consumer-mems", "industrial-mems", "tactical"] | None = None
+    """fills in what is not given below; without it consumer-mems does"""
     angle_random_walk_deg_sqrt_h: Spread
     """deg/sqrt(h)"""
     velocity_random_walk_m_s_sqrt_h: Spread
@@ -252,10 +252,11 @@ class Noise(Section):
         given = {"grade": values} if isinstance(values, str) else values
         if not isinstance(given, dict):
             raise ValueError(f"expected a mapping or the name of a grade: {', '.join(NOISE_GRADES)}")
-        grade = given.get("grade", "consumer-mems")
-        if grade not in NOISE_GRADES:
+        grade = given.get("grade")
+        if grade is not None and grade not in NOISE_GRADES:
             raise ValueError(f"unknown grade {grade!r}; expected one of {', '.join(NOISE_GRADES)}")
-        return {"grade": grade, **NOISE_GRADES[grade], **{key: v for key, v in given.items() if v is not None}}
+        said = {key: value for key, value in given.items() if value is not None}
+        return {"grade": None, **NOISE_GRADES[grade or "consumer-mems"], **said}
 
 
 class InitialErrors(Section):
@@ -518,6 +519,8 @@ def parse(document: Document) -> Config:
 
     Raises InputError that names file, line and key of the first thing wrong.
     """
+    if document.duplicate:
+        raise InputError(f"{document.duplicate}; expected each key once")
     try:
         return Config.model_validate(document.values)
     except ValidationError as error:

@@ -220,7 +220,9 @@ def _correct(state: State) -> None:
         gnss.residuals_to_corrections(state.blocks, first, last, m)
         fuse.correct_members(state.blocks, first, last, g[share.METRIC : share.METRIC + 3])
     for b in range(state.blocks.shape[0]):
-        strapdown.update_matrix(state.blocks[b])
+        w = state.blocks[b]
+        strapdown.update_matrix(w)
+        strapdown.update_sensitivity(w)
     merge(state)
 
 
@@ -242,9 +244,11 @@ def load(state: State, plan: Plan, raw: Array, interval: float) -> None:
     if plan.virtual:
         fuse.average_increments(raw, interval, plan.to_origin, state.before, state.blocks)
         return
-    for k in range(6):
-        for i in range(raw.shape[1]):
-            state.blocks[i // LANES, bank.RAW_DTHETA + k * LANES + i % LANES] = raw[k, i]
+    for b in range(state.blocks.shape[0]):
+        w = state.blocks[b]
+        for k in range(6):
+            for i in range(min(LANES, raw.shape[1] - b * LANES)):
+                w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
 
 
 @kernel
@@ -270,23 +274,27 @@ def step(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, k: int, wor
 def write(state: State, plan: Plan, outputs: Outputs, k: int, time: float) -> None:
     """Write the merged state and its variances; the variance of several shares is their mean."""
     g = state.groups[-1]
-    row, variance = outputs.states[k], outputs.variances[k]
     for i in range(10):
-        row[i] = g[share.POSITION + i]
+        outputs.states[k, i] = g[share.POSITION + i]
     shares = state.members.shape[0]
+    variance = outputs.variances[k]
     for i in range(12):
         variance[i] = 0.0
     for s in range(shares):
-        p = state.groups[s]
-        for i in range(6):
-            variance[i] += p[share.P + i * (share.STRIDE + 1)] / shares
-        n = 6
-        for i in range(6, 9):
-            for j in range(i, 9):
-                variance[n] += p[share.P + i * share.STRIDE + j] / shares
-                n += 1
+        _add_variances(state.groups[s], 1.0 / shares, variance)
     if (k - 1) % plan.log_every == 0:
         _log(state, outputs, time)
+
+
+@kernel
+def _add_variances(g: Array, weight: float, variance: Array) -> None:
+    for i in range(6):
+        variance[i] += weight * g[share.P + i * (share.STRIDE + 1)]
+    n = 6
+    for i in range(6, 9):
+        for j in range(i, 9):
+            variance[n] += weight * g[share.P + i * share.STRIDE + j]
+            n += 1
 
 
 @kernel

@@ -72,7 +72,8 @@ def upright_axes(axes: Axes, force: Array) -> Axes:
     def rating(proposal: Axes) -> float:
         matrix = axes_matrix(proposal)
         # The forward axis is the one to keep, then the right one; both weigh less than any change of what is up.
-        return float(-(matrix @ sensor_force)[2] / np.linalg.norm(force) + 0.01 * (now[:2] * matrix[:2]).sum(1) @ [2, 1])
+        kept = (now * matrix).sum(axis=1) @ [0.02, 0.01, 0.0]
+        return float(kept - (matrix @ sensor_force)[2] / np.linalg.norm(force))
 
     return max(right_handed_axes(), key=rating)
 

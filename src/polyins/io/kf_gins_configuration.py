@@ -21,6 +21,9 @@ NOISE = {
     "gsstd": "gyro_scale_ppm",
     "asstd": "accel_scale_ppm",
 }
+INITIAL_ERRORS = ("initgyrbias", "initaccbias", "initgyrscale", "initaccscale")
+INITIAL_STD = {"initbgstd": "gbstd", "initbastd": "abstd", "initsgstd": "gsstd", "initsastd": "asstd"}
+"""and the noise that is taken where one is not given"""
 GNSS_SNAP_S = 1e-3
 """Within this time of an IMU record that program applies a fix at the record."""
 
@@ -44,19 +47,14 @@ def translated(document: Document) -> tuple[dict[str, Any], tuple[str, ...]]:
         "file": read.text("imupath"),
         "format": "kf-gins",
         "noise": {
-            **{ours: read.three("imunoise", theirs) for theirs, ours in NOISE.items()},
+            **{ours: read.spread("imunoise", theirs) for theirs, ours in NOISE.items()},
             "correlation_time_h": read.number("imunoise", "corrtime"),
         },
-        "initial_errors": _errors(*(read.three(k) for k in ("initgyrbias", "initaccbias", "initgyrscale", "initaccscale"))),
+        "initial_errors": _errors(*(read.three(key) for key in INITIAL_ERRORS)),
         "initial_std": _errors(
             *(
-                read.three(key) if document.values.get(key) is not None else read.three("imunoise", other)
-                for key, other in (
-                    ("initbgstd", "gbstd"),
-                    ("initbastd", "abstd"),
-                    ("initsgstd", "gsstd"),
-                    ("initsastd", "asstd"),
-                )
+                read.spread(key) if document.values.get(key) is not None else read.spread("imunoise", otherwise)
+                for key, otherwise in INITIAL_STD.items()
             )
         ),
     }
@@ -75,14 +73,14 @@ def translated(document: Document) -> tuple[dict[str, Any], tuple[str, ...]]:
             "roll_pitch_deg": read.three("initatt")[:2],
             "heading_deg": read.three("initatt")[2],
             "heading_from": "value",
-            "position_std_m": read.three("initposstd"),
-            "velocity_std_m_s": read.three("initvelstd"),
-            "attitude_std_deg": read.three("initattstd"),
+            "position_std_m": read.spread("initposstd"),
+            "velocity_std_m_s": read.spread("initvelstd"),
+            "attitude_std_deg": read.spread("initattstd"),
             "estimate_gyro_bias": False,
         },
         "filter": {"gate_limit": None, "gnss_snap_s": GNSS_SNAP_S},
     }
-    return values, (*document.warnings, *_ignored_output(document))
+    return values, _warnings(document)
 
 
 class _Reader:
@@ -107,6 +105,12 @@ class _Reader:
             raise InputError(f"{self._document.place(keys)}: is {value!r}; expected three numbers, like [0, 0, 0]")
         return [self._as_number(item, keys) for item in values[:3]]
 
+    def spread(self, *keys: Key) -> list[float]:
+        values = self.three(*keys)
+        if min(values) < 0.0:
+            raise InputError(f"{self._document.place(keys)}: is {values}; expected no negative number")
+        return values
+
     def _value(self, keys: tuple[Key, ...]) -> Any:
         value: Any = self._document.values
         for key in keys:
@@ -125,7 +129,9 @@ class _Reader:
             raise InputError(f"{self._document.place(keys)}: is {value!r}; expected a number") from error
 
 
-def _errors(gyro_bias: list[float], accel_bias: list[float], gyro_scale: list[float], accel_scale: list[float]) -> dict[str, Any]:
+def _errors(
+    gyro_bias: list[float], accel_bias: list[float], gyro_scale: list[float], accel_scale: list[float]
+) -> dict[str, Any]:
     return {
         "gyro_bias_deg_s": [value / HOUR for value in gyro_bias],
         "accel_bias_m_s2": [value * MGAL for value in accel_bias],
@@ -134,7 +140,10 @@ def _errors(gyro_bias: list[float], accel_bias: list[float], gyro_scale: list[fl
     }
 
 
-def _ignored_output(document: Document) -> tuple[str, ...]:
-    if "outputpath" not in document.values:
-        return ()
-    return (f"{document.place(['outputpath'])}: is ignored; --out says where results go",)
+def _warnings(document: Document) -> tuple[str, ...]:
+    texts = []
+    if document.duplicate:
+        texts.append(f"{document.duplicate}; the first one counts")
+    if "outputpath" in document.values:
+        texts.append(f"{document.place(['outputpath'])}: is ignored; --out says where results go")
+    return tuple(texts)

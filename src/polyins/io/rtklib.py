@@ -45,7 +45,8 @@ def read_gnss(path: str | Path) -> Track:
         raise InputError(f"{found}: has a header and no rows; expected positions")
     dated = "/" in numbered[0][1]
     rows = _rows(found, numbered)
-    time = _seconds_from_date(rows[:, :6], re.search(r"%\s+UTC\s+lat", header) is not None) if dated else _seconds_from_week(rows[:, :2])
+    utc = re.search(r"%\s+UTC\s+lat", header) is not None
+    time = _seconds_from_date(rows[:, :6], utc) if dated else _seconds_from_week(rows[:, :2])
     values = rows[:, 6 if dated else 2 :]
     names = _names(lines, values.shape[1])
 
@@ -98,7 +99,7 @@ def _names(lines: list[str], count: int) -> list[str]:
 
 
 def _seconds_from_week(rows: Array) -> Array:
-    return rows[:, 1] + (rows[:, 0] - rows[0, 0]) * WEEK_S
+    return np.asarray(rows[:, 1] + (rows[:, 0] - rows[0, 0]) * WEEK_S)
 
 
 def _seconds_from_date(rows: Array, utc: bool) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,11 @@ Key = str | int
 class Document:
     """The mapping that a YAML file holds, and where its keys stand."""
 
-    def __init__(self, path: Path, tree: Any, warnings: tuple[str, ...] = ()) -> None:
+    def __init__(self, path: Path, tree: Any, duplicate: str = "") -> None:
         self.path = path
         self.values: dict[str, Any] = _plain(tree)
-        self.warnings = warnings
+        self.duplicate = duplicate
+        """says which key is given twice, if one is; the first one counts"""
         self._tree = tree
 
     def place(self, keys: Sequence[Key]) -> str:
@@ -28,40 +30,46 @@ class Document:
         where = f"{self.path}, line {line}" if line else str(self.path)
         return f"{where}: {key_path(keys)}" if keys else where
 
+    @contextmanager
+    def at(self, keys: Sequence[Key]) -> Iterator[None]:
+        """Put the place of a value before the message of an InputError from the block."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.place(keys)}: {error}") from error
+
     def _line(self, keys: Sequence[Key]) -> int | None:
-        node, line = self._tree, None
+        node: Any = self._tree
+        line = None
         for key in keys:
             try:
-                line = (node.lc.key(key) if isinstance(node, dict) else node.lc.item(key))[0] + 1
+                line = (node.lc.item if isinstance(key, int) else node.lc.key)(key)[0] + 1
                 node = node[key]
             except (KeyError, IndexError, TypeError, AttributeError):
                 break
         return line
 
 
-def read_yaml(path: str | Path, *, first_of_duplicates: bool = False) -> Document:
+def read_yaml(path: str | Path) -> Document:
     """Read a YAML file whose top level is a mapping.
 
-    A key given twice is an error, or with `first_of_duplicates` the first one counts and a warning says so.
-    Raises InputError with the line for anything that is not such a file.
+    Raises InputError with the line for anything else, except for a key that is given twice: `Document.duplicate`
+    says so and the reader of the configuration decides.
     """
     from ruamel.yaml import YAML
     from ruamel.yaml.constructor import DuplicateKeyError
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-    found, text = find(path), read_text(path)
-    warnings: tuple[str, ...] = ()
+    found, text, duplicate = find(path), read_text(path), ""
+    reader = YAML()
     try:
-        tree = YAML().load(text)
-    except DuplicateKeyError as error:
-        mark = error.problem_mark
-        message = f"{found}, line {mark.line + 1}: {error.problem.split(' with value')[0].strip()}"
-        if not first_of_duplicates:
-            raise InputError(f"{message}; expected each key once") from error
-        warnings = (f"{message}; the first one counts",)
-        reader = YAML()
-        reader.allow_duplicate_keys = True
-        tree = reader.load(text)
+        try:
+            tree = reader.load(text)
+        except DuplicateKeyError as error:
+            line = error.problem_mark.line + 1
+            duplicate = f"{found}, line {line}: {error.problem.split(' with value')[0].strip()}"
+            reader.allow_duplicate_keys = True
+            tree = reader.load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f", line {mark.line + 1}" if mark else ""
@@ -70,7 +78,7 @@ def read_yaml(path: str | Path, *, first_of_duplicates: bool = False) -> Documen
         raise InputError(f"{found}: {str(error).splitlines()[0]}; expected YAML") from error
     if not isinstance(tree, dict):
         raise InputError(f"{found}: is not a configuration; expected YAML with keys such as imus")
-    return Document(found, tree, warnings)
+    return Document(found, tree, duplicate)
 
 
 def write_yaml(values: dict[str, Any]) -> str:

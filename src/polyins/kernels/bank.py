@@ -24,6 +24,7 @@ QUATERNION = _take(4)  # q_nb, scalar first
 MATRIX = _take(9)  # C_nb, kept in step with the quaternion
 # estimated errors: gyro bias, accelerometer bias, gyro scale, accelerometer scale
 ERRORS = _take(12)
+SENSITIVITY = _take(6)  # 1 / (1 + scale) of gyros and accelerometers, kept in step with the errors
 # measured increments over the whole interval, and the corrected ones over the part that is propagated
 RAW_DTHETA = _take(3)
 RAW_DVEL = _take(3)

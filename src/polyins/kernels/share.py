@@ -169,88 +169,101 @@ def error_model(g: Array, dt: float, near: Array) -> None:
 
 
 @formula
-def _position_row(g: Array, i: int, source: int, stride: int, target: int, width: int, dt: float) -> None:
-    f0, f1, f2 = g[F_RR + 3 * i], g[F_RR + 3 * i + 1], g[F_RR + 3 * i + 2]
-    for j in range(width):
+def _product(g: Array, source: int, stride: int, j: int, f: tuple[float, float, float]) -> float:
+    return f[0] * g[source + j] + f[1] * g[source + stride + j] + f[2] * g[source + 2 * stride + j]
+
+
+@formula
+def _skew_product(g: Array, source: int, stride: int, j: int, i: int, f: tuple[float, float]) -> float:
+    return f[0] * g[source + (i + 1) % 3 * stride + j] + f[1] * g[source + (i + 2) % 3 * stride + j]
+
+
+@formula
+def _outer_product(g: Array, source: int, stride: int, j: int, f: tuple[float, float]) -> float:
+    return f[0] * g[source + j] + f[1] * g[source + 2 * stride + j]
+
+
+@formula
+def _triple(g: Array, f: int, i: int) -> tuple[float, float, float]:
+    return g[f + 3 * i], g[f + 3 * i + 1], g[f + 3 * i + 2]
+
+
+@formula
+def _skew_pair(g: Array, f: int, i: int) -> tuple[float, float]:
+    return g[f + 3 * i + (i + 1) % 3], g[f + 3 * i + (i + 2) % 3]
+
+
+@formula
+def _position_row(g: Array, i: int, source: int, stride: int, target: int, begin: int, end: int, dt: float) -> None:
+    r = _triple(g, F_RR, i)
+    for j in range(begin, end):
         g[target + i * stride + j] = (
-            g[source + i * stride + j]
-            + dt * g[source + (_V + i) * stride + j]
-            + f0 * g[source + j]
-            + f1 * g[source + stride + j]
-            + f2 * g[source + 2 * stride + j]
+            g[source + i * stride + j] + dt * g[source + (_V + i) * stride + j] + _product(g, source, stride, j, r)
         )
 
 
 @formula
-def _product(g: Array, source: int, stride: int, j: int, f0: float, f1: float, f2: float) -> float:
-    return f0 * g[source + j] + f1 * g[source + stride + j] + f2 * g[source + 2 * stride + j]
-
-
-@formula
-def _velocity_row(g: Array, i: int, source: int, stride: int, target: int, width: int) -> None:
-    r0, r1, r2 = g[F_VR + 3 * i], g[F_VR + 3 * i + 1], g[F_VR + 3 * i + 2]
-    v0, v1, v2 = g[F_VV + 3 * i], g[F_VV + 3 * i + 1], g[F_VV + 3 * i + 2]
-    p0, p1, p2 = g[F_VP + 3 * i], g[F_VP + 3 * i + 1], g[F_VP + 3 * i + 2]
-    a0, a1, a2 = g[F_VA + 3 * i], g[F_VA + 3 * i + 1], g[F_VA + 3 * i + 2]
-    s0, s1, s2 = g[F_VS + 3 * i], g[F_VS + 3 * i + 1], g[F_VS + 3 * i + 2]
-    for j in range(width):
+def _velocity_row(g: Array, i: int, source: int, stride: int, target: int, begin: int, end: int) -> None:
+    r = g[F_VR + 3 * i], g[F_VR + 3 * i + 2]  # no error depends on longitude
+    v, p = _triple(g, F_VV, i), _skew_pair(g, F_VP, i)
+    a, s = _triple(g, F_VA, i), _triple(g, F_VS, i)
+    for j in range(begin, end):
         g[target + (_V + i) * stride + j] = (
             g[source + (_V + i) * stride + j]
-            + _product(g, source + _R * stride, stride, j, r0, r1, r2)
-            + _product(g, source + _V * stride, stride, j, v0, v1, v2)
-            + _product(g, source + _P * stride, stride, j, p0, p1, p2)
-            + _product(g, source + _A * stride, stride, j, a0, a1, a2)
-            + _product(g, source + _AS * stride, stride, j, s0, s1, s2)
+            + _outer_product(g, source + _R * stride, stride, j, r)
+            + _product(g, source + _V * stride, stride, j, v)
+            + _skew_product(g, source + _P * stride, stride, j, i, p)
+            + _product(g, source + _A * stride, stride, j, a)
+            + _product(g, source + _AS * stride, stride, j, s)
         )
 
 
 @formula
-def _phi_row(g: Array, i: int, source: int, stride: int, target: int, width: int) -> None:
-    r0, r1, r2 = g[F_PR + 3 * i], g[F_PR + 3 * i + 1], g[F_PR + 3 * i + 2]
-    v0, v1, v2 = g[F_PV + 3 * i], g[F_PV + 3 * i + 1], g[F_PV + 3 * i + 2]
-    p0, p1, p2 = g[F_PP + 3 * i], g[F_PP + 3 * i + 1], g[F_PP + 3 * i + 2]
-    b0, b1, b2 = g[F_PG + 3 * i], g[F_PG + 3 * i + 1], g[F_PG + 3 * i + 2]
-    s0, s1, s2 = g[F_PS + 3 * i], g[F_PS + 3 * i + 1], g[F_PS + 3 * i + 2]
-    for j in range(width):
+def _phi_row(g: Array, i: int, source: int, stride: int, target: int, begin: int, end: int) -> None:
+    r = g[F_PR + 3 * i], g[F_PR + 3 * i + 2]
+    column = 1 - i % 2  # north and down turn with east velocity, east with north velocity
+    v, p = g[F_PV + 3 * i + column], _skew_pair(g, F_PP, i)
+    b, s = _triple(g, F_PG, i), _triple(g, F_PS, i)
+    for j in range(begin, end):
         g[target + (_P + i) * stride + j] = (
             g[source + (_P + i) * stride + j]
-            + _product(g, source + _R * stride, stride, j, r0, r1, r2)
-            + _product(g, source + _V * stride, stride, j, v0, v1, v2)
-            + _product(g, source + _P * stride, stride, j, p0, p1, p2)
-            + _product(g, source + _G * stride, stride, j, b0, b1, b2)
-            + _product(g, source + _GS * stride, stride, j, s0, s1, s2)
+            + _outer_product(g, source + _R * stride, stride, j, r)
+            + v * g[source + (_V + column) * stride + j]
+            + _skew_product(g, source + _P * stride, stride, j, i, p)
+            + _product(g, source + _G * stride, stride, j, b)
+            + _product(g, source + _GS * stride, stride, j, s)
         )
 
 
 @kernel
 def _navigation_rows_of_phi_p(g: Array, dt: float) -> None:
     """T = the navigation rows of Phi P."""
-    _position_row(g, 0, P, STRIDE, T, STRIDE, dt)
-    _position_row(g, 1, P, STRIDE, T, STRIDE, dt)
-    _position_row(g, 2, P, STRIDE, T, STRIDE, dt)
-    _velocity_row(g, 0, P, STRIDE, T, STRIDE)
-    _velocity_row(g, 1, P, STRIDE, T, STRIDE)
-    _velocity_row(g, 2, P, STRIDE, T, STRIDE)
-    _phi_row(g, 0, P, STRIDE, T, STRIDE)
-    _phi_row(g, 1, P, STRIDE, T, STRIDE)
-    _phi_row(g, 2, P, STRIDE, T, STRIDE)
+    _position_row(g, 0, P, STRIDE, T, 0, STRIDE, dt)
+    _position_row(g, 1, P, STRIDE, T, 0, STRIDE, dt)
+    _position_row(g, 2, P, STRIDE, T, 0, STRIDE, dt)
+    _velocity_row(g, 0, P, STRIDE, T, 0, STRIDE)
+    _velocity_row(g, 1, P, STRIDE, T, 0, STRIDE)
+    _velocity_row(g, 2, P, STRIDE, T, 0, STRIDE)
+    _phi_row(g, 0, P, STRIDE, T, 0, STRIDE)
+    _phi_row(g, 1, P, STRIDE, T, 0, STRIDE)
+    _phi_row(g, 2, P, STRIDE, T, 0, STRIDE)
 
 
 @kernel
 def _navigation_rows_of_phi_u(g: Array, dt: float) -> None:
-    """V = Phi U with U = T', so that V is the navigation block of Phi P Phi'."""
+    """V = Phi U with U = T', so that V is the navigation block of Phi P Phi'; its upper blocks suffice."""
     for k in range(STATES):
         for j in range(NAV):
             g[U + k * NAV_STRIDE + j] = g[T + j * STRIDE + k]
-    _position_row(g, 0, U, NAV_STRIDE, V, NAV_STRIDE, dt)
-    _position_row(g, 1, U, NAV_STRIDE, V, NAV_STRIDE, dt)
-    _position_row(g, 2, U, NAV_STRIDE, V, NAV_STRIDE, dt)
-    _velocity_row(g, 0, U, NAV_STRIDE, V, NAV_STRIDE)
-    _velocity_row(g, 1, U, NAV_STRIDE, V, NAV_STRIDE)
-    _velocity_row(g, 2, U, NAV_STRIDE, V, NAV_STRIDE)
-    _phi_row(g, 0, U, NAV_STRIDE, V, NAV_STRIDE)
-    _phi_row(g, 1, U, NAV_STRIDE, V, NAV_STRIDE)
-    _phi_row(g, 2, U, NAV_STRIDE, V, NAV_STRIDE)
+    _position_row(g, 0, U, NAV_STRIDE, V, 0, 12, dt)
+    _position_row(g, 1, U, NAV_STRIDE, V, 0, 12, dt)
+    _position_row(g, 2, U, NAV_STRIDE, V, 0, 12, dt)
+    _velocity_row(g, 0, U, NAV_STRIDE, V, 3, 11)
+    _velocity_row(g, 1, U, NAV_STRIDE, V, 3, 11)
+    _velocity_row(g, 2, U, NAV_STRIDE, V, 3, 11)
+    _phi_row(g, 0, U, NAV_STRIDE, V, 6, 10)
+    _phi_row(g, 1, U, NAV_STRIDE, V, 6, 10)
+    _phi_row(g, 2, U, NAV_STRIDE, V, 6, 10)
 
 
 @kernel

@@ -28,6 +28,7 @@ from polyins.kernels.bank import (
     RAW_DTHETA,
     RAW_DVEL,
     ROTATION,
+    SENSITIVITY,
     TO_LATITUDE,
     TO_LONGITUDE,
     TRANSPORT_RATE,
@@ -46,16 +47,20 @@ S = tuple(0.5 * (-1.0) ** k / math.factorial(2 * k + 1) for k in range(10))
 
 @kernel
 def compensate(w: Array, fraction: float, dt: float) -> None:
-    """Correct the part `fraction` of the measured increments, which took `dt` seconds, for the estimated errors."""
-    for axis in range(3):
-        a = axis * LANES
-        for i in range(LANES):
-            bias_g = w[ERRORS + a + i]
-            bias_a = w[ERRORS + 3 * LANES + a + i]
-            scale_g = w[ERRORS + 6 * LANES + a + i]
-            scale_a = w[ERRORS + 9 * LANES + a + i]
-            w[DTHETA + a + i] = (w[RAW_DTHETA + a + i] * fraction - bias_g * dt) / (1.0 + scale_g)
-            w[DVEL + a + i] = (w[RAW_DVEL + a + i] * fraction - bias_a * dt) / (1.0 + scale_a)
+    """Correct the part `fraction` of the measured increments, which took `dt` seconds, for the estimated errors.
+
+    (increment - bias dt) / (1 + scale)
+    """
+    for i in range(3 * LANES):
+        w[DTHETA + i] = (w[RAW_DTHETA + i] * fraction - w[ERRORS + i] * dt) * w[SENSITIVITY + i]
+        w[DVEL + i] = (w[RAW_DVEL + i] * fraction - w[ERRORS + 3 * LANES + i] * dt) * w[SENSITIVITY + 3 * LANES + i]
+
+
+@kernel
+def update_sensitivity(w: Array) -> None:
+    """Write 1 / (1 + scale) after the errors have changed."""
+    for i in range(6 * LANES):
+        w[SENSITIVITY + i] = 1.0 / (1.0 + w[ERRORS + 6 * LANES + i])
 
 
 @kernel

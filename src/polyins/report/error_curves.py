@@ -13,7 +13,7 @@ from polyins.evaluate.attitude import euler_angles, euler_variance
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.palette import transparent
 from polyins.report.scene import Run, Scene
-from polyins.report.style import finish, shade_outages, stacked
+from polyins.report.style import finish, mark_time, stacked
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -32,33 +32,31 @@ class Curves:
 
 def position_figure(scene: Scene) -> Figure:
     """Draw the position errors, m."""
-    curves = [Curves(run, _position_errors(run), np.sqrt(run.solution.position_variance)) for run in scene.runs]
+    curves = [
+        Curves(run, run.at_epochs(lambda errors: errors.position), np.sqrt(run.solution.position_variance))
+        for run in scene.runs
+    ]
     return _figure(scene, curves, ("north (m)", "east (m)", "down (m)"))
 
 
 def velocity_figure(scene: Scene) -> Figure | None:
     """Draw the velocity errors, m/s; None if the reference has no velocity."""
+    if scene.recording.reference is None or scene.recording.reference.velocity is None:
+        return None
     curves = [
-        Curves(run, run.at_epochs(run.errors.velocity), np.sqrt(run.solution.velocity_variance))
+        Curves(run, run.at_epochs(lambda errors: errors.velocity), np.sqrt(run.solution.velocity_variance))
         for run in scene.runs
-        if run.errors is not None and run.errors.velocity is not None
     ]
-    return _figure(scene, curves, ("north (m/s)", "east (m/s)", "down (m/s)")) if curves else None
+    return _figure(scene, curves, ("north (m/s)", "east (m/s)", "down (m/s)"))
 
 
 def attitude_figure(scene: Scene) -> Figure:
     """Draw the attitude errors, deg."""
-    curves = [Curves(run, np.degrees(_attitude_errors(run)), _attitude_std_deg(run)) for run in scene.runs]
+    curves = [
+        Curves(run, np.degrees(run.at_epochs(lambda errors: errors.attitude)), _attitude_std_deg(run))
+        for run in scene.runs
+    ]
     return _figure(scene, curves, ("roll (deg)", "pitch (deg)", "heading (deg)"))
-
-
-def _position_errors(run: Run) -> Array:
-    return run.at_epochs(np.full(3, np.nan) if run.errors is None else run.errors.position)
-
-
-def _attitude_errors(run: Run) -> Array:
-    known = run.errors is not None and run.errors.attitude is not None
-    return run.at_epochs(run.errors.attitude if known else np.full(3, np.nan))
 
 
 def _attitude_std_deg(run: Run) -> Array:
@@ -69,11 +67,12 @@ def _attitude_std_deg(run: Run) -> Array:
 def _figure(scene: Scene, curves: Sequence[Curves], rows: Sequence[str]) -> Figure:
     figure = stacked(rows)
     points = points_per_trace(3 * len(rows) * len(curves))
+    opacity = 0.14 / np.sqrt(len(curves))
     for row in range(len(rows)):
-        bands = [trace for one in curves for trace in _band(scene, one, row, points)]
+        bands = [trace for one in curves for trace in _band(scene, one, row, points, opacity)]
         lines = [_line(scene, one, row, points) for one in curves]
         figure.add_traces([*bands, *lines], rows=row + 1, cols=1)
-    shade_outages(figure, scene.outages)
+    mark_time(figure, scene.duration, scene.outages)
     return finish(figure, height=640)
 
 
@@ -93,7 +92,7 @@ def _line(scene: Scene, curves: Curves, row: int, points: int) -> Any:
     )
 
 
-def _band(scene: Scene, curves: Curves, row: int, points: int) -> Iterator[Any]:
+def _band(scene: Scene, curves: Curves, row: int, points: int, opacity: float) -> Iterator[Any]:
     from plotly.graph_objects import Scatter
 
     run = curves.run
@@ -107,6 +106,6 @@ def _band(scene: Scene, curves: Curves, row: int, points: int) -> Iterator[Any]:
             mode="lines",
             line={"color": transparent(run.colour, 0.35), "width": 0.6},
             fill=fill,
-            fillcolor=transparent(run.colour, 0.10),
+            fillcolor=transparent(run.colour, opacity),
             hoverinfo="skip",
         )

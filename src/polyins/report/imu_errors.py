@@ -11,7 +11,7 @@ import numpy as np
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.palette import imu_colours
 from polyins.report.scene import Run, Scene
-from polyins.report.style import choose, finish, shade_outages, stacked
+from polyins.report.style import choose, finish, mark_time, stacked
 from polyins.rig import DEG, HOUR, MGAL, PPM
 
 if TYPE_CHECKING:
@@ -35,10 +35,11 @@ def imu_error_figure(scene: Scene) -> Figure | None:
             traces = list(_traces(scene, run, state, points))
             figure.add_traces(traces, rows=state // 3 + 1, cols=state % 3 + 1)
             owners += [index] * len(traces)
-    shade_outages(figure, scene.outages, columns=3)
+    mark_time(figure, scene.duration, scene.outages, columns=3)
     finish(figure, height=860)
-    choose(figure, [run.label for run in runs], owners)
-    figure.update_layout(legend={"y": -0.07, "yanchor": "top"}, margin={"t": 40})
+    most = int(np.argmax([len(run.solution.imu_names) for run in runs]))
+    choose(figure, [run.label for run in runs], owners, first=most)
+    figure.update_annotations(yshift=2)
     return figure
 
 

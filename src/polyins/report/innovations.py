@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.palette import REJECTED, transparent
 from polyins.report.scene import Run, Scene
-from polyins.report.style import choose, finish, shade_outages, stacked
+from polyins.report.style import choose, finish, mark_time, stacked
 from polyins.solution import Innovations
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def innovation_figure(scene: Scene) -> Figure | None:
             traces = [*_band(scene, run, row, points), *_residuals(scene, run, row, limits[row], points)]
             figure.add_traces(traces, rows=row + 1, cols=1)
             owners += [index] * len(traces)
-    shade_outages(figure, scene.outages)
+    mark_time(figure, scene.duration, scene.outages)
     finish(figure, height=640)
     for row, limit in enumerate(limits, start=1):
         figure.update_yaxes(range=[-1.05 * limit, 1.05 * limit], row=row)
@@ -50,7 +50,8 @@ def innovation_figure(scene: Scene) -> Figure | None:
 def _limits(innovations: Innovations) -> Array:
     """Return the greatest accepted residual or three sigma, m, shape (3,)."""
     accepted = np.abs(innovations.residual[innovations.accepted])
-    return np.maximum(np.max(3.0 * innovations.std, axis=0), np.max(accepted, axis=0, initial=0.0))
+    limits: Array = np.fmax(3.0 * innovations.std.max(axis=0), accepted.max(axis=0, initial=0.0))
+    return limits
 
 
 def _band(scene: Scene, run: Run, row: int, points: int) -> Iterator[Any]:

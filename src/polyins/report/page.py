@@ -42,6 +42,8 @@ SECTIONS: tuple[tuple[str, str, str, Callable[[Scene], Figure | None]], ...] = (
 )
 WIDE = ("imus",)
 """figures that scroll sideways on a narrow screen"""
+NO_BUTTONS = ("sendChartToCloud", "select2d", "lasso2d")
+"""what would send the figure to a server, or has no use here"""
 
 
 def write_report(
@@ -81,7 +83,7 @@ def _sections(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _html(figure: Figure, name: str) -> str:
-    config = {"displaylogo": False, "responsive": True}
+    config = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": NO_BUTTONS, "plotlyServerURL": ""}
     text: str = figure.to_html(full_html=False, include_plotlyjs=False, div_id=f"plot-{name}", config=config)
     return text
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from html import escape
 
@@ -34,11 +34,11 @@ class Run:
         """The name as Plotly takes it, which reads some HTML."""
         return escape(self.name)
 
-    def at_epochs(self, errors: Array) -> Array:
-        """Spread errors, shape (E, 3), over the solution's epochs, shape (T, 3), with NaN where there is none."""
+    def at_epochs(self, part: Callable[[Errors], Array | None]) -> Array:
+        """Spread a part of the errors over the solution's epochs, shape (T, 3), with NaN where it is unknown."""
         spread = np.full((self.solution.time.size, 3), np.nan)
-        if self.errors is not None:
-            spread[self.errors.covered] = errors
+        if self.errors is not None and (known := part(self.errors)) is not None:
+            spread[self.errors.covered] = known
         return spread
 
 
@@ -69,6 +69,11 @@ class Scene:
         """The first epoch of any run, s: the figures' time zero."""
         return float(min(run.solution.time[0] for run in self.runs))
 
+    @property
+    def duration(self) -> float:
+        """From the start to the last epoch of any run, s."""
+        return float(max(run.solution.time[-1] for run in self.runs)) - self.start
+
     def since_start(self, time: Array) -> NDArray[np.float32]:
         """Return the time since the start, s."""
         return np.asarray(time - self.start, dtype=np.float32)
@@ -81,7 +86,8 @@ class Scene:
     @property
     def origin(self) -> Array:
         """The position from which tracks are measured: the first solution's start."""
-        return self.runs[0].solution.position[0]
+        start: Array = self.runs[0].solution.position[0]
+        return start
 
 
 def _errors(solution: Solution, recording: Recording) -> Errors | None:

@@ -36,6 +36,7 @@ def finish(figure: Figure, height: int) -> Figure:
         legend={"orientation": "h", "x": 0.0, "y": 1.02, "yanchor": "bottom", "groupclick": "togglegroup"},
         hoverlabel={"font": {"family": FONT}},
         hovermode="closest",
+        showlegend=True,
     )
     figure.update_xaxes(**AXES)
     figure.update_yaxes(**AXES)
@@ -60,11 +61,11 @@ def stacked(rows: Sequence[str], columns: int = 1, column_titles: Sequence[str] 
     return figure
 
 
-def shade_outages(figure: Figure, outages: Sequence[tuple[float, float]], columns: int = 1) -> None:
-    """Shade the outages, s since the start, behind all rows of each column."""
-    figure.update_layout(
-        shapes=[_shade(outage, f"x{column}" if column > 1 else "x") for outage in outages for column in range(1, columns + 1)]
-    )
+def mark_time(figure: Figure, duration: float, outages: Sequence[tuple[float, float]], columns: int = 1) -> None:
+    """Let the time axes span the run, and shade the outages, s since the start, behind all rows of each column."""
+    figure.update_xaxes(range=[0.0, duration])
+    axes = ["x", *(f"x{column}" for column in range(2, columns + 1))]
+    figure.update_layout(shapes=[_shade(outage, axis) for outage in outages for axis in axes])
 
 
 def _shade(outage: tuple[float, float], axis: str) -> dict[str, Any]:
@@ -83,24 +84,29 @@ def _shade(outage: tuple[float, float], axis: str) -> dict[str, Any]:
     }
 
 
-def choose(figure: Figure, labels: Sequence[str], owners: Sequence[int]) -> None:
-    """Add a menu that shows the traces of one choice at a time; `owners` says to which choice each trace belongs."""
+def choose(figure: Figure, labels: Sequence[str], owners: Sequence[int], first: int = 0) -> None:
+    """Add a menu that shows the traces of one choice at a time; `owners` says to which choice each trace belongs.
+
+    The legend moves below the figure: the menu takes its place.
+    """
     buttons = [
         {"label": label, "method": "restyle", "args": [{"visible": [owner == choice for owner in owners]}]}
         for choice, label in enumerate(labels)
     ]
     for trace, owner in zip(figure.data, owners, strict=True):
-        trace.visible = owner == 0
+        trace.visible = owner == first
+    figure.update_layout(legend={"y": 0.0, "yref": "container", "yanchor": "bottom"}, margin={"t": 72, "b": 100})
     if len(labels) > 1:
         figure.update_layout(
             updatemenus=[
                 {
                     "buttons": buttons,
+                    "active": first,
                     "x": 0.0,
                     "xanchor": "left",
                     "y": 1.0,
                     "yanchor": "bottom",
-                    "pad": {"b": 26},
+                    "pad": {"b": 28},
                     "bgcolor": "white",
                     "bordercolor": "#C5CBD6",
                 }

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from polyins.evaluate.summary import Document, plain
 from polyins.recording import Recording
 from polyins.report.scene import Run, Scene
@@ -24,10 +22,10 @@ class Table:
     """method, its colour, its figures"""
 
 
-UNKNOWN = "–"
+UNKNOWN = "\N{EM DASH}"
 
 COLUMNS: tuple[tuple[str, int, Callable[[Document], float | None]], ...] = (
-    ("outages, rms of max. (m)", 2, lambda run: run["outages"]["horizontal_max_rms_m"]),
+    ("outages: rms of max. (m)", 2, lambda run: run["outages"]["horizontal_max_rms_m"]),
     ("horizontal rms (m)", 3, lambda run: run["reference"]["horizontal_rms_m"]),
     ("horizontal max. (m)", 2, lambda run: run["reference"]["horizontal_max_m"]),
     ("vertical rms (m)", 3, lambda run: run["reference"]["vertical_rms_m"]),
@@ -36,6 +34,7 @@ COLUMNS: tuple[tuple[str, int, Callable[[Document], float | None]], ...] = (
     ("heading rmse (deg)", 3, lambda run: run["reference"]["heading_rmse_deg"]),
     ("NEES position", 2, lambda run: run["consistency"]["nees_position"]),
     ("NIS GNSS", 2, lambda run: run["consistency"]["nis_gnss"]),
+    ("fixes rejected", 0, lambda run: run["gnss"]["rejected"]),
     ("time per epoch (µs)", 2, lambda run: run["us_per_epoch"]),
 )
 RATIOS = (("error, single / method", "ratio_to_single"), ("time, method / single", "time_ratio_to_single"))
@@ -60,7 +59,7 @@ def facts(scene: Scene) -> list[Cell]:
         ("IMUs", _imus(recording)),
         ("solution", f"{duration:.1f} s, {first.summary['epochs']:,} epochs at {_number(rate, 1)} Hz"),
         ("time zero", f"{scene.start:.3f} s"),
-        ("GNSS", _gnss(scene)),
+        ("GNSS", "none" if recording.gnss is None else f"{recording.gnss.time.size:,} fixes"),
         ("outages", _outages(first.summary["outages"])),
         ("reference", _reference(recording)),
         ("positions", "geodetic (WGS 84)" if recording.geodetic else "local tangent plane, no Earth rate"),
@@ -69,7 +68,7 @@ def facts(scene: Scene) -> list[Cell]:
 
 
 def warnings_by_text(scene: Scene) -> list[tuple[str, str]]:
-    """Return each warning once, with the names of the runs that gave it; no name if all did or it is the recording's."""
+    """Return each warning once, with the runs that gave it; without a name if all did or it is the recording's."""
     given: dict[str, list[str]] = {}
     for run in scene.runs:
         for text in dict.fromkeys(run.summary["warnings"]):
@@ -95,14 +94,6 @@ def _imus(recording: Recording) -> str:
     return f"{len(names)} ({', '.join(shown)})"
 
 
-def _gnss(scene: Scene) -> str:
-    gnss = scene.recording.gnss
-    if gnss is None:
-        return "none"
-    rejected = ", ".join(f"{np.count_nonzero(~run.solution.innovations.accepted)} {run.name}" for run in scene.runs)
-    return f"{gnss.time.size:,} fixes; rejected: {rejected}"
-
-
 def _outages(outages: Document) -> str:
     if not outages["count"]:
         return "none"
@@ -114,8 +105,9 @@ def _reference(recording: Recording) -> str:
     reference = recording.reference
     if reference is None:
         return "none: errors are unknown, bands only"
-    extra = [name for name, part in (("velocity", reference.velocity), ("attitude", reference.attitude)) if part is not None]
-    return f"{', '.join(['position', *extra])}; {reference.time.size:,} epochs"
+    parts = {"position": reference.position, "velocity": reference.velocity, "attitude": reference.attitude}
+    known = ", ".join(name for name, part in parts.items() if part is not None)
+    return f"{known}; {reference.time.size:,} epochs"
 
 
 def _value(value: object) -> str:

@@ -91,10 +91,9 @@ def draw_errors(
     gyro_misalignment, accel_misalignment = rng.normal(0.0, imperfections.misalignment_std, (2, 3))
     constant = np.sqrt(share) * std * rng.standard_normal(12)
     step = min(DRIFT_STEP, grade.correlation_time / DRIFT_STEPS_PER_CORRELATION_TIME)
-    time = step * np.arange(int(np.ceil(duration / step)) + 1)
+    time = np.arange(np.ceil(duration / step) + 1.0) * step
     drift = np.sqrt(1.0 - share) * std * gauss_markov(time.size, step / grade.correlation_time, rng)
-    series = np.asarray(constant + drift, dtype=float)
-    return TrueErrors(time, series, gyro_misalignment, accel_misalignment)
+    return TrueErrors(time, constant + drift, gyro_misalignment, accel_misalignment)
 
 
 def gauss_markov(count: int, step: float, rng: np.random.Generator) -> Array:

@@ -23,9 +23,11 @@ from polyins.config import (
     _explain,
 )
 from polyins.errors import InputError
+from polyins.io.checks import axes_matrix
 from polyins.io.yaml_document import read_yaml, write_yaml
+from polyins.load import noise_grade
 from polyins.recording import GnssStream, ImuStream, Recording, Reference, StartOptions
-from polyins.rig import DEG, Imu, NoiseGrade, Rig
+from polyins.rig import DEG, Imu, Rig
 from polyins.simulate import gnss
 from polyins.simulate.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors
 from polyins.simulate.increments import Increments, increments
@@ -64,8 +66,7 @@ class Board(Section):
 
     def rotation(self, index: int) -> Array:
         """Return C_ab of an IMU, shape (3, 3)."""
-        axes = self.mounts[index % len(self.mounts)]
-        return np.array([np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0) for axis in axes])
+        return axes_matrix(self.mounts[index % len(self.mounts)])
 
 
 class Errors(Section):
@@ -146,7 +147,7 @@ class Scenario(Section):
 
     def rig(self) -> Rig:
         """Return what is mounted where."""
-        grade = NoiseGrade.from_datasheet(**self.noise.model_dump(exclude={"grade"}))
+        grade = noise_grade(self.noise)
         imus = [
             Imu(f"imu{index + 1}", grade, self.imus.rotation(index), position)
             for index, position in enumerate(self.imus.positions())
@@ -224,6 +225,7 @@ def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, se
         _sense(imu, exact, imperfections, np.random.default_rng(own_seed))
         for imu, own_seed in zip(rig.imus, imu_seed.spawn(len(rig.imus)), strict=True)
     ]
+    still = (float(exact.time[0]), scenario.static_s)
     stream, lies = _receive(scenario, path, np.random.default_rng(gnss_seed))
     recording = Recording(
         rig=rig,
@@ -231,7 +233,7 @@ def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, se
         gnss=stream,
         reference=_reference(path, scenario.reference_rate_hz),
         outages=scenario.outage_intervals(),
-        start=StartOptions(static_interval=(0.0, scenario.static_s) if scenario.static_s else None),
+        start=StartOptions(static_interval=still if still[0] < still[1] else None),
         name=scenario.name,
         config_text=write_yaml(scenario.model_dump(mode="json")),
     )
@@ -276,6 +278,6 @@ def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[
 
 
 def _reference(path: Path, rate_hz: float) -> Reference:
-    time = np.arange(int(np.floor(path.duration * rate_hz + 1e-6)) + 1) / rate_hz
+    time = np.arange(1.0, np.floor(path.duration * rate_hz + 1e-6) + 1.0) / rate_hz
     truth = path.truth(time)
     return Reference(time, truth.position, truth.velocity, truth.attitude)

@@ -1,0 +1,96 @@
+"""One IMU as configured: its file read, checked, and turned into array axes on the recording's clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.config import ImuEntry, InitialErrors, InitialStd, Noise
+from polyins.errors import InputError
+from polyins.io import checks, kf_gins, table, xsens_dot
+from polyins.io.files import find
+from polyins.io.recognize import imu_format
+from polyins.io.rows import ImuRows
+from polyins.io.yaml_document import Document
+from polyins.recording import Array, ImuStream
+from polyins.rig import DEG, PPM, Imu, ImuErrors, NoiseGrade
+
+
+def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuStream, tuple[str, ...]]:
+    """Read the IMU of that index; returns its mount and errors, its increments in array axes, and warnings.
+
+    Raises InputError for data and settings that cannot be right.
+    """
+    place = document.place(["imus", index, "axes"])
+    with document.at(["imus", index, "file"]):
+        find(entry.file)
+    rows = _rows(entry, document.place(["imus", index]))
+    warnings = checks.check_imu(rows, entry.name)
+    rotation = mount_rotation(entry.mount_deg) @ checks.axes_matrix(entry.axes)
+    time = rows.time + entry.clock_offset_s
+    stream = ImuStream(entry.name, time, rows.dtheta @ rotation.T, rows.dvel @ rotation.T)
+    checks.check_upright(entry.name, place, entry.axes, time, stream.dvel)
+    with document.at(["imus", index]):
+        imu = Imu(
+            entry.name,
+            noise_grade(entry.noise),
+            rotation,
+            np.array(entry.position_m),
+            _initial_errors(entry.initial_errors),
+            _initial_std(entry.initial_std, noise_grade(entry.noise)),
+        )
+    return imu, stream, warnings
+
+
+def _rows(entry: ImuEntry, place: str) -> ImuRows:
+    kind: str = entry.format
+    if kind == "auto":
+        kind = "table" if entry.columns else imu_format(entry.file)
+    if entry.columns and kind != "table":
+        raise InputError(f"{place}: columns are given and format is {kind}; expected columns with format table only")
+    if kind == "xsens-dot":
+        return xsens_dot.read_imu(entry.file, entry.rate_hz)
+    if kind == "table":
+        return table.read_imu(entry.file, entry.columns, entry.rate_hz)
+    rows = kf_gins.read_imu(entry.file)
+    return replace(rows, time=np.arange(len(rows.time)) / entry.rate_hz) if entry.rate_hz else rows
+
+
+def mount_rotation(mount_deg: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3), of roll, pitch, yaw in degrees."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(np.radians(mount_deg)), np.sin(np.radians(mount_deg))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def noise_grade(noise: Noise) -> NoiseGrade:
+    """Convert a noise section to SI."""
+    return NoiseGrade.from_datasheet(**noise.model_dump(exclude={"grade"}))
+
+
+def _initial_errors(errors: InitialErrors) -> ImuErrors:
+    return ImuErrors(
+        np.array(errors.gyro_bias_deg_s) * DEG,
+        np.array(errors.accel_bias_m_s2),
+        np.array(errors.gyro_scale_ppm) * PPM,
+        np.array(errors.accel_scale_ppm) * PPM,
+    )
+
+
+def _initial_std(std: InitialStd, noise: NoiseGrade) -> ImuErrors:
+    def of(given: tuple[float, float, float] | None, unit: float, otherwise: Array) -> Array:
+        return otherwise if given is None else np.array(given) * unit
+
+    return ImuErrors(
+        of(std.gyro_bias_deg_s, DEG, noise.gyro_bias_std),
+        of(std.accel_bias_m_s2, 1.0, noise.accel_bias_std),
+        of(std.gyro_scale_ppm, PPM, noise.gyro_scale_std),
+        of(std.accel_scale_ppm, PPM, noise.accel_scale_std),
+    )

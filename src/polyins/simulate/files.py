@@ -1,0 +1,132 @@
+"""A recording as files: one Parquet table per stream and the YAML configuration that `polyins.load` reads back.
+
+Increments are written as the recording holds them, in array axes; the configuration therefore has no mount rotations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.io.files import whole, write_bytes
+from polyins.io.table import ATTITUDE_NAMES, GEODETIC_NAMES, LOCAL_NAMES, VELOCITY_NAMES, write_gnss, write_imu
+from polyins.io.yaml_document import write_yaml
+from polyins.recording import FilterOptions, Recording, Reference, StartOptions
+from polyins.rig import DEG, HOUR, MGAL, PPM, Imu, ImuErrors, NoiseGrade
+
+Array = NDArray[np.float64]
+
+CONFIG = "recording.yaml"
+
+
+def write(recording: Recording, folder: str | Path) -> Path:
+    """Write a recording into a folder, which is made if there is none, and return the path of its configuration."""
+    place = Path(folder)
+    config: dict[str, Any] = {"name": recording.name, "imus": [_imu(imu) for imu in recording.rig.imus]}
+    for stream in recording.imus:
+        write_imu(place / f"{stream.name}.parquet", stream)
+    if recording.gnss is not None:
+        config["gnss"] = {"file": "gnss.parquet", "antenna_position_m": recording.rig.antenna.tolist()}
+        write_gnss(place / "gnss.parquet", recording.gnss, geodetic=recording.geodetic)
+    if recording.reference is not None:
+        config["reference"] = {"file": "reference.parquet", "point_m": recording.reference.lever_arm.tolist()}
+        write_reference(place / "reference.parquet", recording.reference, geodetic=recording.geodetic)
+    config["start"] = _start(recording.start, recording.geodetic)
+    config["outages"] = [list(outage) for outage in recording.outages]
+    config["filter"] = _filter(recording.options)
+    write_bytes(place / CONFIG, write_yaml(config).encode())
+    return place / CONFIG
+
+
+def write_reference(path: str | Path, reference: Reference, *, geodetic: bool) -> None:
+    """Write positions, and velocities and attitudes where there are any, as Parquet."""
+    from pyarrow import parquet, table
+
+    columns = {"time_s": reference.time}
+    columns |= _named(*_position_columns(reference.position, geodetic))
+    if reference.velocity is not None:
+        columns |= _named(VELOCITY_NAMES, reference.velocity)
+    if reference.attitude is not None:
+        columns |= _named(ATTITUDE_NAMES, reference.attitude / DEG)
+    with whole(path) as beside:
+        parquet.write_table(table(columns), beside)
+
+
+def _position_columns(position: Array, geodetic: bool) -> tuple[tuple[str, ...], Array]:
+    if geodetic:
+        return GEODETIC_NAMES, position / [DEG, DEG, 1.0]
+    return LOCAL_NAMES, position * [1.0, 1.0, -1.0]
+
+
+def _named(names: tuple[str, ...], values: Array) -> dict[str, Array]:
+    return dict(zip(names, values.T, strict=True))
+
+
+def _imu(imu: Imu) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "name": imu.name,
+        "file": f"{imu.name}.parquet",
+        "position_m": _in(1.0, imu.position),
+        "noise": _noise(imu.noise),
+        "initial_errors": _errors(imu.initial_errors),
+    }
+    if imu.initial_std is not None:
+        entry["initial_std"] = _errors(imu.initial_std)
+    return entry
+
+
+def _noise(grade: NoiseGrade) -> dict[str, Any]:
+    """Return a grade in the units of datasheets."""
+    return {
+        "angle_random_walk_deg_sqrt_h": _in(DEG / np.sqrt(HOUR), grade.angle_random_walk),
+        "velocity_random_walk_m_s_sqrt_h": _in(1.0 / np.sqrt(HOUR), grade.velocity_random_walk),
+        "gyro_bias_deg_h": _in(DEG / HOUR, grade.gyro_bias_std),
+        "accel_bias_mgal": _in(MGAL, grade.accel_bias_std),
+        "gyro_scale_ppm": _in(PPM, grade.gyro_scale_std),
+        "accel_scale_ppm": _in(PPM, grade.accel_scale_std),
+        "correlation_time_h": grade.correlation_time / HOUR,
+    }
+
+
+def _errors(errors: ImuErrors) -> dict[str, Any]:
+    return {
+        "gyro_bias_deg_s": _in(DEG, errors.gyro_bias),
+        "accel_bias_m_s2": _in(1.0, errors.accel_bias),
+        "gyro_scale_ppm": _in(PPM, errors.gyro_scale),
+        "accel_scale_ppm": _in(PPM, errors.accel_scale),
+    }
+
+
+def _in(unit: float, value: Array) -> list[float]:
+    """Return a value in a unit, without the noise of the conversion in the last digit."""
+    return [float(f"{number:.15g}") for number in value / unit]
+
+
+def _start(start: StartOptions, geodetic: bool) -> dict[str, Any]:
+    """Return what is known of the start under the names of the configuration."""
+    names = {
+        "time": ("time_s", 1.0),
+        "end_time": ("end_time_s", 1.0),
+        "velocity": ("velocity_m_s", 1.0),
+        "roll_pitch": ("roll_pitch_deg", DEG),
+        "heading": ("heading_deg", DEG),
+        "static_interval": ("static_interval_s", 1.0),
+        "position_std": ("position_std_m", 1.0),
+        "velocity_std": ("velocity_std_m_s", 1.0),
+        "attitude_std": ("attitude_std_deg", DEG),
+    }
+    known = {name: getattr(start, name) for name in names if getattr(start, name) is not None}
+    entry = {names[name][0]: (np.asarray(value) / names[name][1]).tolist() for name, value in known.items()}
+    if start.position is not None:
+        columns, unit = (GEODETIC_NAMES, DEG) if geodetic else (("north_m", "east_m", "height_m"), 1.0)
+        entry["position"] = dict(zip(columns, (start.position / [unit, unit, 1.0]).tolist(), strict=True))
+    return entry | {"heading_from": start.heading_from, "estimate_gyro_bias": start.estimate_gyro_bias}
+
+
+def _filter(options: FilterOptions) -> dict[str, Any]:
+    units = {"gnss_snap": "gnss_snap_s", "gravity": "gravity_m_s2"}
+    return {units.get(item.name, item.name): getattr(options, item.name) for item in fields(options)}

@@ -1,0 +1,146 @@
+"""The figures hold the data that they claim to show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic_solutions import RADIUS_M, drive, no_innovations
+
+from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
+from polyins.report.imu_errors import imu_error_figure
+from polyins.report.innovations import innovation_figure
+from polyins.report.outage_bars import outage_figure
+from polyins.report.palette import METHOD_COLOURS, imu_colours, method_styles
+from polyins.report.scene import Scene
+from polyins.report.trajectory import trajectory_figure
+
+
+@pytest.fixture(scope="module")
+def scene(made_runs, made_recording, compared) -> Scene:
+    return Scene.of(made_runs, made_recording, compared)
+
+
+@pytest.fixture(scope="module")
+def blind(made_runs, made_recording) -> Scene:
+    """Neither reference nor fixes nor outages."""
+    bare = replace(made_recording, reference=None, gnss=None, outages=())
+    made, summary = made_runs["enav-fusion"]
+    nothing = {**summary, "outages": {"count": 0, "length_s": None, "horizontal_max_rms_m": None, "each_m": []}}
+    quiet = replace(made, innovations=no_innovations(), imu_error_time=np.zeros(0), imu_errors=np.zeros((0, 6, 12)))
+    return Scene.of({"enav-fusion": (quiet, nothing)}, bare, None)
+
+
+def named(figure, name: str) -> list:
+    return [trace for trace in figure.data if trace.name == name]
+
+
+def test_the_track_is_drawn_in_metres_with_equal_scales(scene):
+    figure = trajectory_figure(scene)
+    (reference,) = named(figure, "reference")
+    assert np.ptp(reference.x) == pytest.approx(2.0 * RADIUS_M, rel=1e-3)
+    assert np.ptp(reference.y) == pytest.approx(2.0 * RADIUS_M, rel=1e-3)
+    assert figure.layout.yaxis.scaleanchor == "x"
+    assert [trace.name for trace in figure.data[-5:-1]] == list(scene.runs[k].name for k in range(4))
+
+
+def test_rejected_fixes_are_drawn_once_where_they_were_measured(scene):
+    (rejected,) = named(trajectory_figure(scene), "rejected fixes")
+    truth = drive(duration=300.0)
+    times = scene.runs[0].solution.innovations.time[[5, 40]]
+    where = truth.local[np.searchsorted(truth.time, times)]
+    np.testing.assert_allclose(np.column_stack([rejected.y, rejected.x]), where[:, :2], atol=0.02)
+    assert "rejected by single, imu-fusion, nav-fusion, enav-fusion" in rejected.text[0]
+
+
+def test_only_the_track_inside_outages_is_marked(scene):
+    (marked,) = named(trajectory_figure(scene), "GNSS outage")
+    assert np.isnan(marked.x).any()
+    assert not np.isnan(marked.x).all()
+
+
+def test_error_curves_reach_the_peaks_of_the_errors(scene):
+    figure = position_figure(scene)
+    for run in scene.runs:
+        lines = named(figure, run.name)
+        assert len(lines) == 3
+        for row, line in enumerate(lines):
+            assert np.nanmax(np.abs(line.y)) == pytest.approx(np.max(np.abs(run.errors.position[:, row])), rel=1e-6)
+            assert line.line.color == METHOD_COLOURS[run.name]
+
+
+def test_bands_are_three_standard_deviations(scene):
+    bands = [trace for trace in position_figure(scene).data if trace.legendgroup == "nav-fusion" and trace.name is None]
+    assert len(bands) == 6
+    widest = 3.0 * np.sqrt(scene.runs[2].solution.position_variance.max())
+    assert max(np.max(band.y) for band in bands) == pytest.approx(widest, rel=1e-6)
+    assert min(np.min(band.y) for band in bands) == pytest.approx(-widest, rel=1e-6)
+
+
+def test_attitude_errors_are_in_degrees(scene):
+    line = named(attitude_figure(scene), "single")[2]
+    assert np.max(np.abs(line.y)) == pytest.approx(np.degrees(0.002), rel=1e-3)
+
+
+def test_time_runs_from_the_start_and_outages_are_shaded(scene):
+    figure = position_figure(scene)
+    assert [(shape.x0, shape.x1) for shape in figure.layout.shapes] == [(30.0, 60.0), (120.0, 150.0), (210.0, 240.0)]
+    assert figure.layout.xaxis.range == (0.0, 300.0)
+
+
+def test_bars_are_the_outages_maxima(scene, compared):
+    figure = outage_figure(scene)
+    for bar, run in zip(figure.data, scene.runs, strict=True):
+        assert list(bar.y) == compared["methods"][run.name]["outages"]["each_m"]
+        assert f"rms {run.summary['outages']['horizontal_max_rms_m']:.2f} m" in bar.name
+
+
+def test_imu_errors_are_drawn_for_each_imu_in_datasheet_units(scene):
+    figure = imu_error_figure(scene)
+    shown = [trace for trace in figure.data if trace.visible]
+    assert len(shown) == 6 * 12
+    assert [trace.name for trace in shown[:6]] == [f"imu{k}" for k in range(1, 7)]
+    largest = np.max(scene.runs[2].solution.imu_errors[:, 0, 0]) * 180.0 / np.pi * 3600.0
+    assert np.max(shown[0].y) == pytest.approx(largest, rel=1e-6)
+    in_ppm = np.max(scene.runs[2].solution.imu_errors[:, 0, 11]) * 1e6
+    assert np.max(shown[66].y) == pytest.approx(in_ppm, rel=1e-6)
+
+
+def test_each_choice_of_the_menu_shows_one_run(scene):
+    figure = innovation_figure(scene)
+    (menu,) = figure.layout.updatemenus
+    masks = np.array([button.args[0]["visible"] for button in menu.buttons])
+    assert masks.shape == (4, len(figure.data))
+    np.testing.assert_array_equal(masks.sum(axis=0), 1)
+
+
+def test_rejected_residuals_stay_in_sight_and_tell_their_value(scene):
+    figure = innovation_figure(scene)
+    rejected = named(figure, "rejected")[0]
+    assert np.all(np.abs(rejected.y) <= figure.layout.yaxis.range[1])
+    assert np.all(rejected.customdata > 2.5)
+
+
+def test_without_reference_fixes_or_outages_the_rest_is_drawn(blind):
+    assert [trace.name for trace in trajectory_figure(blind).data] == ["enav-fusion"]
+    assert outage_figure(blind) is None
+    assert velocity_figure(blind) is None
+    assert imu_error_figure(blind) is None
+    assert innovation_figure(blind) is None
+    lines = named(position_figure(blind), "enav-fusion")
+    assert all(np.isnan(line.y).all() for line in lines)
+
+
+def test_each_method_has_a_colour_of_its_own_and_repeated_ones_a_dash():
+    array = ["single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization"]
+    wheels = ["wheel-ins", "body-ins", "dual-wheel-ins", "body-wheel-ins", "triple-ins", "multi-wheel-ins"]
+    for family in (array, wheels):
+        assert len({colour for colour, _ in method_styles(family)}) == len(family)
+    both = method_styles(["wheel-ins/IMU2", "wheel-ins/IMU4", "unheard-of"])
+    assert both[0] == (METHOD_COLOURS["wheel-ins"], "solid")
+    assert both[1] == (METHOD_COLOURS["wheel-ins"], "dash")
+    assert both[2][0] not in METHOD_COLOURS.values()
+
+
+@pytest.mark.parametrize("count", [1, 8, 9, 100])
+def test_imus_have_different_colours(count):
+    assert len(set(imu_colours(count))) == count
