@@ -578,6 +578,18 @@ def test_a_fix_next_to_an_epoch_is_used_at_that_epoch(offset: float) -> None:
     assert at(0.3 + 2.0 * offset)["position"][61, 2] != exact["position"][61, 2]
 
 
+def test_a_fix_just_after_another_is_used_where_that_one_was() -> None:
+    dtheta, dvel = noisy(TIME, seed=8, imus=1)
+
+    def second_at(time: float) -> dict[str, Any]:
+        fixes = [replace(FIXES[0], time=0.3021), replace(FIXES[0], time=time)]
+        return run_single(TIME, dtheta[:, 0], dvel[:, 0], ANTENNA, fixes, HOME, START_STD, NOISE)
+
+    near, same = second_at(0.3026), second_at(0.3021)
+    np.testing.assert_array_equal(near["position"], same["position"])
+    assert second_at(0.3033)["position"][61, 2] != same["position"][61, 2]
+
+
 def test_splitting_an_interval_changes_hardly_anything_when_the_fix_says_nothing() -> None:
     dtheta, dvel = noisy(TIME, seed=6, imus=1)
     silent = [Fix(t, HOME.position, np.full(3, 1e9)) for t in (0.3021, 0.3032, 0.9015)]

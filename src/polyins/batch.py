@@ -55,7 +55,7 @@ def run(
     """
     row = find_method(method)
     if row.bank == "one":
-        recording = recording.only(imu)
+        recording = recording.subset([imu])
     aligned = timesync.align(recording.imus)
     start = alignment.find_start(recording, aligned)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time

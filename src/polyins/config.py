@@ -556,6 +556,10 @@ def _explain(error: ErrorDetails, document: Document) -> str:
         return f"{place}: is missing; expected it in this mapping"
     if kind == "literal_error":
         return f"{place}: is {error['input']!r}; expected {context['expected']}"
+    if kind == "too_short":
+        return f"{place}: is empty; expected at least one"
+    if kind in ("tuple_type", "model_type", "dict_type"):
+        return f"{place}: is {error['input']!r}; expected a {'list' if kind == 'tuple_type' else 'mapping'}"
     message = error["msg"].removeprefix("Value error, ")
     if kind in ("unknown_key", "axes") or not message.startswith(("expected", "Input should be")):
         return f"{place}: {message[0].lower()}{message[1:]}"

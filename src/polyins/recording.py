@@ -6,6 +6,7 @@ A position is (latitude rad, longitude rad, ellipsoidal height m) where the reco
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -130,6 +131,7 @@ class Recording:
     """the configuration in force, as YAML"""
     warnings: tuple[str, ...] = ()
 
-    def only(self, index: int) -> Recording:
-        """Return the recording with just the IMU of that index."""
-        return replace(self, rig=self.rig.only(index), imus=(self.imus[index],))
+    def subset(self, indices: Iterable[int]) -> Recording:
+        """Return the recording with just the IMUs of those indices."""
+        kept = tuple(indices)
+        return replace(self, rig=self.rig.subset(kept), imus=tuple(self.imus[i] for i in kept))

@@ -5,6 +5,7 @@ Everything is SI inside. Datasheet units (deg/h, mGal, ppm, deg/sqrt(h)) appear 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -163,9 +164,9 @@ class Rig:
             if names.count(name) > 1:
                 raise InputError(f"imus: two IMUs are named {name!r}; expected a name of its own for each")
 
-    def only(self, index: int) -> Rig:
-        """Return the rig with just the IMU of that index."""
-        return replace(self, imus=(self.imus[index],))
+    def subset(self, indices: Iterable[int]) -> Rig:
+        """Return the rig with just the IMUs of those indices."""
+        return replace(self, imus=tuple(self.imus[i] for i in indices))
 
 
 def check_lever_arm(what: str, vector: Vector) -> None:

@@ -39,12 +39,12 @@ def test_bounds_of_one_run_are_those_of_the_tables():
 def test_position_nees_of_one_run_is_three_when_the_variances_are_right():
     truth = drive(duration=600.0)
     generator = np.random.default_rng(1)
-    std = np.array([0.5, 2.0, 1.0])
+    std = np.array([0.5, 2.0, 1.0]) * np.linspace(1.0, 3.0, truth.time.size)[:, None]
     noise = generator.normal(size=(truth.time.size, 3)) * std
-    noisy = solution(truth, position=moved(truth.geodetic, noise), position_variance=np.tile(std**2, (len(noise), 1)))
+    noisy = solution(truth, position=moved(truth.geodetic, noise), position_variance=std**2)
     late = reference(truth, time=truth.time[100:], position=truth.geodetic[100:], velocity=None, attitude=None)
     errors = compare_to_reference(noisy, late)
-    expected = np.sum((noise[100:] / std) ** 2, axis=1)
+    expected = np.sum((noise / std)[100:] ** 2, axis=1)
     np.testing.assert_allclose(position_nees(noisy, errors), expected, rtol=1e-5)
     assert consistency(noisy, errors)["nees_position"] == pytest.approx(3.0, rel=0.05)
 

@@ -124,6 +124,16 @@ def test_distance_is_measured_along_the_reference():
     np.testing.assert_allclose(errors.distance, RADIUS_M * 0.1 * (truth.time - 1000.0), rtol=1e-4, atol=1e-6)
 
 
+def test_distance_counts_from_the_solutions_first_epoch_not_the_references():
+    truth = drive()
+    kept = slice(400, None)
+    late = solution(truth, time=truth.time[kept], position=truth.geodetic[kept], velocity=truth.velocity[kept],
+                    attitude=truth.attitude[kept])  # fmt: skip
+    errors = compare_to_reference(late, reference(truth))
+    assert errors.distance[0] == 0.0
+    assert errors.distance[-1] == pytest.approx(RADIUS_M * 4.0, rel=1e-4)
+
+
 @pytest.mark.parametrize("time", [[1000.0], [1000.0, 1000.0], [1001.0, 1000.0]])
 def test_a_reference_without_increasing_times_is_refused(time):
     truth = drive()

@@ -36,7 +36,9 @@ def compared(made_runs: dict) -> dict:
 
 
 @pytest.fixture(scope="session")
-def report(made_runs: dict, made_recording: Recording, compared: dict, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(
+    made_runs: dict, made_recording: Recording, compared: dict, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
     write_report(path, made_runs, made_recording, compared)
     return path

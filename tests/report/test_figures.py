@@ -40,7 +40,7 @@ def test_the_track_is_drawn_in_metres_with_equal_scales(scene):
     assert np.ptp(reference.x) == pytest.approx(2.0 * RADIUS_M, rel=1e-3)
     assert np.ptp(reference.y) == pytest.approx(2.0 * RADIUS_M, rel=1e-3)
     assert figure.layout.yaxis.scaleanchor == "x"
-    assert [trace.name for trace in figure.data[-5:-1]] == list(scene.runs[k].name for k in range(4))
+    assert [trace.name for trace in figure.data[-5:-1]] == [run.name for run in scene.runs]
 
 
 def test_rejected_fixes_are_drawn_once_where_they_were_measured(scene):
@@ -128,6 +128,27 @@ def test_without_reference_fixes_or_outages_the_rest_is_drawn(blind):
     assert innovation_figure(blind) is None
     lines = named(position_figure(blind), "enav-fusion")
     assert all(np.isnan(line.y).all() for line in lines)
+
+
+def test_a_solution_that_diverged_is_drawn_as_far_as_it_goes(made_runs, made_recording):
+    made, summary = made_runs["enav-fusion"]
+    position = made.position.copy()
+    position[3000:] = np.nan
+    broken = replace(made, position=position, position_variance=np.where(np.isnan(position), np.inf, 1.0))
+    scene = Scene.of({"enav-fusion": (broken, summary)}, made_recording, None)
+    line = named(position_figure(scene), "enav-fusion")[0]
+    last = np.max(line.x[~np.isnan(line.y)])
+    assert last == pytest.approx(made.time[2999] - made.time[0])
+    (track,) = named(trajectory_figure(scene), "enav-fusion")
+    assert np.isfinite(track.x).sum() > 500
+
+
+def test_names_are_drawn_as_they_are_written(made_runs, made_recording):
+    made, summary = made_runs["nav-fusion"]
+    odd = replace(made, imu_names=("<b>bold</b>", *made.imu_names[1:]))
+    scene = Scene.of({"a<i>b": (odd, summary)}, made_recording, None)
+    assert named(position_figure(scene), "a&lt;i&gt;b")
+    assert named(imu_error_figure(scene), "&lt;b&gt;bold&lt;/b&gt;")
 
 
 def test_each_method_has_a_colour_of_its_own_and_repeated_ones_a_dash():

@@ -24,6 +24,16 @@ def _cross(a, b):
 
 
 @numba.njit
+def _product(P, Q):
+    R = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                R[i, j] += P[i, k] * Q[k, j]
+    return R
+
+
+@numba.njit
 def _rotation(v):
     """Rodrigues' formula: the matrix of a rotation vector."""
     angle2 = v[0] ** 2 + v[1] ** 2 + v[2] ** 2
@@ -31,7 +41,14 @@ def _rotation(v):
     a = np.sin(angle) / angle if angle > 1e-4 else 1 - angle2 / 6
     b = (1 - np.cos(angle)) / angle2 if angle > 1e-4 else 0.5 - angle2 / 24
     K = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + a * K + b * (K @ K)
+    return np.eye(3) + a * K + b * _product(K, K)
+
+
+@numba.njit
+def _turned(P, v):
+    return np.array([P[0, 0] * v[0] + P[0, 1] * v[1] + P[0, 2] * v[2],
+                     P[1, 0] * v[0] + P[1, 1] * v[1] + P[1, 2] * v[2],
+                     P[2, 0] * v[0] + P[2, 1] * v[1] + P[2, 2] * v[2]])  # fmt: skip
 
 
 @numba.njit
@@ -60,7 +77,7 @@ def mechanize(position, velocity, C, dtheta, dvel, dt):
         turning = _cross(th, dv) / 2 + _cross(th, _cross(th, dv)) / 6
         dv_b = dv + turning + (_cross(last_dtheta, dv) + _cross(last_dvel, th)) / 12
         zeta = (w_ie + w_en) * dt
-        dv_n = _rotation(-zeta / 2) @ C @ dv_b
+        dv_n = _turned(_product(_rotation(-zeta / 2), C), dv_b)
         change = dv_n + (np.array([0, 0, g]) - _cross(2 * w_ie + w_en, middle)) * dt
         mean = v + change / 2
         _, w_en, _, rm, rn = _rates(lat, p[2] - mean[2] * dt / 2, mean)
@@ -68,7 +85,8 @@ def mechanize(position, velocity, C, dtheta, dvel, dt):
         lat_rate = mean[0] / rm
         middle_lat = p[0] + lat_rate * dt / 2
         p = np.array([p[0] + lat_rate * dt, p[1] + mean[1] * dt / (rn * np.cos(middle_lat)), p[2] - mean[2] * dt])
-        C = _rotation(-(w_ie + w_en) * dt) @ C @ _rotation(th + _cross(last_dtheta, th) / 12)
+        C = _product(_rotation(-(w_ie + w_en) * dt), C)
+        C = _product(C, _rotation(th + _cross(last_dtheta, th) / 12))
         positions[k], velocities[k], attitudes[k] = p, v, C
         last_dtheta, last_dvel, last_change = th, dv, change
     return positions, velocities, attitudes

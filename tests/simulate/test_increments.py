@@ -10,12 +10,13 @@ from polyins.simulate import earth
 from polyins.simulate.increments import increments
 from polyins.simulate.path import drive, path
 
+ALIGNED = np.eye(3)
 NORTH_POLE = (np.pi / 2, 0.0, 0.0)
 ATTITUDE = np.array([0.3, -0.2, 2.0])
 C_NB = rotation_matrices(quaternions(ATTITUDE[None]))[0]
 
 
-def mechanized(drawn, rate_hz, point, C_ab=np.eye(3)):
+def mechanized(drawn, rate_hz, point, C_ab=ALIGNED):
     """Return the largest errors, m, m/s and deg, of an IMU that starts from the truth and runs free."""
     exact = increments(drawn, rate_hz)
     start, truth = drawn.truth([0.0], point), drawn.truth(exact.time, point)
@@ -88,9 +89,8 @@ def test_changing_rate_pushes_along_the_tangent():
 def test_coning_drifts_as_bessel_s_function_says():
     # roll = a sin, pitch = a cos: the z axis turns on average by a w J1(a), and sees the earth by J0(sqrt(2) a)
     amplitude, rate, latitude = 0.05, 2.0 * np.pi * 8.0, 0.5
-    coning = path(
-        Line(), Sine(amplitude, rate), Sine(amplitude, rate, np.pi / 2), Line(), duration=1.0, start=(latitude, 0.0, 0.0)
-    )
+    roll, pitch = Sine(amplitude, rate), Sine(amplitude, rate, np.pi / 2)
+    coning = path(Line(), roll, pitch, Line(), duration=1.0, start=(latitude, 0.0, 0.0))
     drift = increments(coning, 400.0).dtheta.sum(axis=0)
     earth_down = -earth.ROTATION_RATE * np.sin(latitude)
     expected = amplitude * rate * jv(1, amplitude) + earth_down * jv(0, np.sqrt(2.0) * amplitude)

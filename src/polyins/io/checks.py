@@ -20,7 +20,9 @@ GRAVITY_M_S2 = (5.0, 15.0)
 """The median size of the specific force lies between these on any vehicle."""
 STANDARD_GRAVITY = 9.80665
 MAX_TURN_RAD = 2.0
-MAX_RATE_RAD_S = 50.0
+MAX_RATE_RAD_S = 10.0
+"""rms over a recording, of anything but a wheel"""
+UNUSUAL_RATE_RAD_S = 3.0
 RATES_HZ = (5.0, 20000.0)
 GAP_INTERVALS = 1.5
 JITTER = 0.2
@@ -30,8 +32,8 @@ MIN_COMMON_S = 2.0
 MAX_STD_M = 10000.0
 
 
-def check_imu(rows: ImuRows, name: str) -> tuple[str, ...]:
-    """Check one IMU's rows, in the sensor's axes, and return warnings.
+def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S) -> tuple[str, ...]:
+    """Check one IMU's rows, in the sensor's axes, and return warnings; `max_rate_rad_s`: rms turn rate allowed.
 
     Raises InputError for fewer than two rows, NaN, stamps that do not increase, and values whose size shows a wrong
     unit.
@@ -42,8 +44,11 @@ def check_imu(rows: ImuRows, name: str) -> tuple[str, ...]:
     _check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
     _check_rate(rows)
     _check_accel_unit(rows)
-    _check_gyro_unit(rows)
-    return (*rows.warnings, *(f"IMU {name}: {text}" for text in _uneven(rows.time)))
+    rate = _check_gyro_unit(rows, max_rate_rad_s)
+    texts = _uneven(rows.time)
+    if rate > UNUSUAL_RATE_RAD_S and max_rate_rad_s <= MAX_RATE_RAD_S:
+        texts.append(f"turns at {rate:.3g} rad/s (rms), which is unusual; is the gyro's unit {rows.gyro_unit}?")
+    return (*rows.warnings, *(f"{rows.source.path}: {text}" for text in texts))
 
 
 def check_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> None:
@@ -211,18 +216,18 @@ def _like_gravity(size: float) -> bool:
     return GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1]
 
 
-def _check_gyro_unit(rows: ImuRows) -> None:
-    steps = np.diff(rows.time)
+def _check_gyro_unit(rows: ImuRows, max_rate: float) -> float:
+    """Return the rms turn rate, rad/s."""
     turn = np.linalg.norm(rows.dtheta[1:], axis=1)
-    rms = float(np.sqrt(np.mean((turn / steps) ** 2)))
+    rms = float(np.sqrt(np.mean((turn / np.diff(rows.time)) ** 2)))
     largest = int(np.argmax(turn))
-    if turn[largest] <= MAX_TURN_RAD and rms <= MAX_RATE_RAD_S:
-        return
+    if turn[largest] <= MAX_TURN_RAD and rms <= max_rate:
+        return rms
     other = {"rad/s": "deg/s", "rad": "rad/s or deg/s", "deg": "deg/s", "deg/s": "another"}[rows.gyro_unit]
     raise InputError(
         f"{rows.source.place(largest + 1)}: with unit {rows.gyro_unit} the turn in one interval is "
         f"{turn[largest]:.3g} rad (rms rate {rms:.3g} rad/s); expected at most {MAX_TURN_RAD:g} rad and "
-        f"{MAX_RATE_RAD_S:g} rad/s: is the unit {other}?"
+        f"{max_rate:g} rad/s: is the unit {other}?"
     )
 
 

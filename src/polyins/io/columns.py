@@ -101,7 +101,7 @@ def _place(path: Path, names: Sequence[str], column: Column) -> int:
         return column - 1
     if column not in names:
         present = [name for name in names if name]
-        near = difflib.get_close_matches(column, present, n=1)
+        near = difflib.get_close_matches(column, present, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(present) or '1, 2, ...'}"
         raise InputError(f"{path}: no column {column!r}; {hint}")
     return names.index(column)
@@ -125,8 +125,7 @@ def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: A
     from pyarrow import ArrowInvalid, BufferReader, csv
 
     def refuse(row: Any) -> str:
-        line = table.first_line + row.number - 1 if row.number else None
-        bad.append(f"{path}, line {line}: {row.actual_columns} columns; expected {row.expected_columns}")
+        bad.append(f"{path}, line {row.number}: {row.actual_columns} columns; expected {row.expected_columns}")
         return "error"
 
     bad: list[str] = []

@@ -27,7 +27,7 @@ def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuS
     with document.at(["imus", index, "file"]):
         find(entry.file)
     rows = _rows(entry, document.place(["imus", index]))
-    warnings = checks.check_imu(rows, entry.name)
+    warnings = checks.check_imu(rows)
     rotation = mount_rotation(entry.mount_deg) @ checks.axes_matrix(entry.axes)
     time = rows.time + entry.clock_offset_s
     stream = ImuStream(entry.name, time, rows.dtheta @ rotation.T, rows.dvel @ rotation.T)

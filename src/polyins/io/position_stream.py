@@ -64,7 +64,8 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
     if entry.position_std_m is not None:
         std = np.tile(entry.position_std_m, (len(track.time), 1))
     if std is None:
-        raise InputError(f"{document.place(['gnss'])}: {track.source.path} has no position std; expected position_std_m")
+        place = document.place(["gnss"])
+        raise InputError(f"{place}: {track.source.path} has no position std; expected position_std_m")
     checks.check_std(track.source, std)
     warnings += checks.check_within(track.source, "GNSS", track.time, span)
     kept = thinned(track.time, entry.rate_hz) if entry.rate_hz else np.arange(len(track.time))

@@ -66,6 +66,6 @@ def _rows_of_numbers(rows: list[str]) -> str | None:
 
 def _table(path: str | Path, rows: list[str]) -> str:
     fields = rows[0].replace(";", ",").replace("\t", ",").split(",") if rows else []
-    if len(fields) < 4:
+    if len(fields) < 3:
         raise InputError(f"{find(path)}: is of no known format; expected IMU data, positions or a configuration")
     return "table"

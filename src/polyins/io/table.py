@@ -111,18 +111,34 @@ def write_imu(path: str | Path, stream: ImuStream) -> None:
 
 
 def write_gnss(path: str | Path, stream: GnssStream, *, geodetic: bool) -> None:
-    """Write positions with their standard deviations, and velocities where there are any, as CSV or Parquet."""
-    if geodetic:
-        names, position = GEODETIC_NAMES, stream.position / [DEG, DEG, 1.0]
-    else:
-        names, position = LOCAL_NAMES, stream.position * [1.0, 1.0, -1.0]
-    columns = ["time_s", *names, *STD_NAMES]
-    values = [stream.time, position, stream.position_std]
-    for extra, block in ((VELOCITY_NAMES, stream.velocity), (VELOCITY_STD_NAMES, stream.velocity_std)):
+    """Write fixes with their standard deviations as CSV or Parquet, by the suffix."""
+    track = Track(
+        Source(str(path)),
+        stream.time,
+        stream.position,
+        geodetic,
+        position_std=stream.position_std,
+        velocity=stream.velocity,
+        velocity_std=stream.velocity_std,
+    )
+    write_track(path, track)
+
+
+def write_track(path: str | Path, track: Track) -> None:
+    """Write positions, and what else there is with them, as CSV or Parquet, by the suffix."""
+    units = np.array([DEG, DEG, 1.0] if track.geodetic else [1.0, 1.0, -1.0])
+    names = ["time_s", *(GEODETIC_NAMES if track.geodetic else LOCAL_NAMES)]
+    values = [track.time, track.position / units]
+    for extra, block, unit in (
+        (STD_NAMES, track.position_std, 1.0),
+        (VELOCITY_NAMES, track.velocity, 1.0),
+        (VELOCITY_STD_NAMES, track.velocity_std, 1.0),
+        (ATTITUDE_NAMES, track.attitude, DEG),
+    ):
         if block is not None:
-            columns += extra
-            values.append(block)
-    _write(path, columns, values)
+            names += extra
+            values.append(block / unit)
+    _write(path, names, values)
 
 
 def _track(source: Source, time: Array, found: dict[str, Array], columns: TrackColumns) -> Track:
@@ -131,16 +147,15 @@ def _track(source: Source, time: Array, found: dict[str, Array], columns: TrackC
     vectors = columns.velocity.frame if columns.velocity else "north-east-down"
     angle_unit = columns.position.unit or "deg"
     scale = [RADIANS[angle_unit], RADIANS[angle_unit], 1.0] if geodetic else 1.0
-    # Upward and downward components differ by the sign of the third, which std do not have.
     up_to_down = [1.0, 1.0, -1.0]
     return Track(
         source,
         time,
         _north_east_up(found["position"], frame) * scale,
         geodetic=geodetic,
-        position_std=np.abs(_north_east_up(found["std"], frame)) if "std" in found else None,
+        position_std=_north_east_first(found["std"], frame) if "std" in found else None,
         velocity=_north_east_up(found["velocity"], vectors) * up_to_down if "velocity" in found else None,
-        velocity_std=np.abs(_north_east_up(found["velocity_std"], vectors)) if "velocity_std" in found else None,
+        velocity_std=_north_east_first(found["velocity_std"], vectors) if "velocity_std" in found else None,
         attitude=found["attitude"] * RADIANS[columns.attitude.unit] if columns.attitude else None,
         angle_unit=angle_unit,
     )
@@ -148,8 +163,11 @@ def _track(source: Source, time: Array, found: dict[str, Array], columns: TrackC
 
 def _north_east_up(values: Array, frame: str) -> Array:
     """Bring three components given in `frame` into the order north, east, up; geodetic ones are in order."""
-    if frame == "north-east-down":
-        return values * [1.0, 1.0, -1.0]
+    return _north_east_first(values, frame) * [1.0, 1.0, -1.0 if frame == "north-east-down" else 1.0]
+
+
+def _north_east_first(values: Array, frame: str) -> Array:
+    """Bring three magnitudes given in `frame` into the order north, east, vertical."""
     return values[:, [1, 0, 2]] if frame == "east-north-up" else values
 
 

@@ -61,13 +61,13 @@ def read_yaml(path: str | Path) -> Document:
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     found, text, duplicate = find(path), read_text(path), ""
-    reader = YAML()
     try:
         try:
-            tree = reader.load(text)
+            tree = YAML().load(text)
         except DuplicateKeyError as error:
             line = error.problem_mark.line + 1
             duplicate = f"{found}, line {line}: {error.problem.split(' with value')[0].strip()}"
+            reader = YAML()
             reader.allow_duplicate_keys = True
             tree = reader.load(text)
     except MarkedYAMLError as error:

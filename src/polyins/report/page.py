@@ -83,7 +83,7 @@ def _sections(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _html(figure: Figure, name: str) -> str:
-    config = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": NO_BUTTONS, "plotlyServerURL": ""}
+    config = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": NO_BUTTONS}
     text: str = figure.to_html(full_html=False, include_plotlyjs=False, div_id=f"plot-{name}", config=config)
     return text
 

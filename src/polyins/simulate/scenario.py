@@ -24,8 +24,8 @@ from polyins.config import (
 )
 from polyins.errors import InputError
 from polyins.io.checks import axes_matrix
+from polyins.io.imu_stream import noise_grade
 from polyins.io.yaml_document import read_yaml, write_yaml
-from polyins.load import noise_grade
 from polyins.recording import GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.rig import DEG, Imu, Rig
 from polyins.simulate import gnss

@@ -1,0 +1,1 @@
+"""Published and measured figures, each as one function that runs the whole chain."""

@@ -1,0 +1,183 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from polyins.config import Noise, OutageSchedule
+from polyins.errors import InputError
+from polyins.simulate.increments import increments
+from polyins.simulate.scenario import (
+    Board,
+    Errors,
+    Fixes,
+    Lies,
+    Scenario,
+    demo,
+    read_scenario,
+    simulate,
+    simulate_with_truth,
+)
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SHORT = Scenario(duration_s=60.0, static_s=10.0, rate_hz=50.0, imus=Board(count=3), outages=((30.0, 40.0),))
+PERFECT = Errors(noise=False, biases=False, scales=False)
+MOUNTS = (("x", "y", "z"), ("x", "-y", "-z"), ("y", "z", "x"))
+
+
+def changed(**fields):
+    return SHORT.model_copy(update=fields)
+
+
+def test_a_recording_has_what_the_scenario_says():
+    recording = simulate(SHORT)
+    assert [imu.name for imu in recording.rig.imus] == [stream.name for stream in recording.imus]
+    assert {stream.time.size for stream in recording.imus} == {3000}
+    assert recording.imus[0].rate_hz == pytest.approx(50.0)
+    assert recording.geodetic
+    assert recording.outages == ((30.0, 40.0),)
+    assert recording.start.static_interval == (0.02, 10.0)
+    assert recording.gnss.time.size == 60
+    assert not np.any(np.isin(recording.gnss.time, recording.imus[0].time))
+    assert recording.reference.time[[0, -1]] == pytest.approx([0.1, 60.0])
+    np.testing.assert_array_equal(recording.rig.antenna, [-0.3, 0.2, -1.0])
+
+
+def test_the_reference_is_the_truth_of_the_array_origin():
+    simulation = simulate_with_truth(SHORT)
+    reference = simulation.recording.reference
+    truth = simulation.path.truth(reference.time)
+    for name in ("position", "velocity", "attitude"):
+        np.testing.assert_array_equal(getattr(reference, name), getattr(truth, name))
+    np.testing.assert_array_equal(reference.lever_arm, 0.0)
+
+
+def test_perfect_imus_read_the_exact_increments_in_array_axes():
+    simulation = simulate_with_truth(changed(errors=PERFECT, imus=Board(count=5, pitch_m=0.2, mounts=MOUNTS)))
+    exact = increments(simulation.path, 50.0)
+    for imu, stream in zip(simulation.recording.rig.imus, simulation.recording.imus, strict=True):
+        dtheta, dvel = exact.at(imu.position)
+        np.testing.assert_allclose(stream.dtheta, dtheta, atol=1e-17)
+        np.testing.assert_allclose(stream.dvel, dvel, atol=1e-15)
+
+
+def test_drawn_errors_explain_the_streams():
+    errors = Errors(noise=False, turn_on_share=0.5)
+    simulation = simulate_with_truth(changed(errors=errors, imus=Board(count=3, mounts=MOUNTS)))
+    exact = increments(simulation.path, 50.0)
+    for imu, stream, drawn in zip(
+        simulation.recording.rig.imus, simulation.recording.imus, simulation.errors, strict=True
+    ):
+        gyro_bias, accel_bias, gyro_scale, accel_scale = np.split(
+            drawn.in_array_axes(exact.time - 0.01, imu.rotation), 4, axis=1
+        )
+        dtheta, dvel = exact.at(imu.position)
+        np.testing.assert_allclose(stream.dtheta, (1 + gyro_scale) * dtheta + gyro_bias * 0.02, atol=1e-15)
+        np.testing.assert_allclose(stream.dvel, (1 + accel_scale) * dvel + accel_bias * 0.02, atol=1e-14)
+
+
+def test_one_imu_more_changes_no_other():
+    few, more = (simulate(changed(imus=Board(count=count, pitch_m=0.0))) for count in (2, 4))
+    for first, second in zip(few.imus, more.imus, strict=False):
+        np.testing.assert_array_equal(first.dtheta, second.dtheta)
+        np.testing.assert_array_equal(first.dvel, second.dvel)
+    np.testing.assert_array_equal(few.gnss.position, more.gnss.position)
+    assert np.abs(more.imus[0].dtheta - more.imus[1].dtheta).max() > 1e-6
+
+
+def test_a_seed_repeats_and_another_differs():
+    first, again, other = simulate(SHORT), simulate(SHORT), simulate(SHORT, seed=1)
+    np.testing.assert_array_equal(first.imus[1].dvel, again.imus[1].dvel)
+    np.testing.assert_array_equal(first.gnss.position, again.gnss.position)
+    assert np.abs(first.reference.position - other.reference.position).max() > 1e-7
+    assert YAML(typ="safe").load(other.config_text)["seed"] == 1
+
+
+def test_lies_are_told_where_the_filter_sees_them():
+    lying = Fixes(rate_hz=5.0, lies=Lies(count=20, size_m=40.0))
+    simulation = simulate_with_truth(changed(gnss=lying))
+    fix = simulation.recording.gnss
+    truth = simulation.path.truth(fix.time, lying.antenna_position_m)
+    wrong = np.abs(fix.position - truth.position)[:, :2].max(axis=1) * 6.4e6 > 10.0
+    np.testing.assert_array_equal(np.flatnonzero(wrong), simulation.lies)
+    told = fix.time[simulation.lies]
+    assert told.size == 20
+    assert told.min() > 10.0
+    assert not np.any((told >= 30.0) & (told <= 40.0))
+
+
+def test_without_a_receiver_there_is_no_gnss():
+    recording = simulate(changed(gnss=None))
+    assert recording.gnss is None
+    assert YAML(typ="safe").load(recording.config_text)["gnss"] is None
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 6, 16])
+def test_the_board_is_centred_and_spaced(count):
+    positions = Board(count=count, pitch_m=0.1).positions()
+    np.testing.assert_allclose(positions.mean(axis=0), 0.0, atol=1e-15)
+    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)[np.triu_indices(count, 1)]
+    assert apart.size == 0 or apart.min() == pytest.approx(0.1)
+    assert np.unique(np.round(positions, 9), axis=0).shape[0] == count
+
+
+def test_sixteen_imus_fill_a_square():
+    np.testing.assert_allclose(np.ptp(Board().positions(), axis=0), [0.045, 0.045, 0.0])
+
+
+def test_an_outage_schedule_counts_from_the_standing_start_and_ends_in_time():
+    scenario = Scenario(duration_s=400.0, static_s=60.0, outages=OutageSchedule(length_s=30.0, every_s=90.0))
+    assert scenario.outage_intervals() == ((120.0, 150.0), (210.0, 240.0), (300.0, 330.0))
+
+
+def test_the_demonstration_has_four_outages_of_thirty_seconds():
+    assert [end - begin for begin, end in demo().outage_intervals()] == [30.0] * 4
+    assert demo().imus.count == 16
+
+
+def test_the_default_grade_is_that_of_the_array_s_chips():
+    noise = Scenario().rig().imus[0].noise
+    assert noise.angle_random_walk[0] == pytest.approx(np.radians(0.24) / 60.0)
+    assert noise.velocity_random_walk[0] == pytest.approx(0.24 / 60.0)
+    assert noise.gyro_bias_std[0] == pytest.approx(np.radians(50.0) / 3600.0)
+    assert noise.accel_bias_std[0] == pytest.approx(2.5e-3)
+    assert noise.gyro_scale_std[0] == noise.accel_scale_std[0] == pytest.approx(1e-3)
+    assert noise.correlation_time == 3600.0
+
+
+def test_the_configuration_in_force_reads_back(tmp_path):
+    scenario = changed(gnss=None, imus=Board(count=2, mounts=MOUNTS), noise=Noise.model_validate("tactical"))
+    file = tmp_path / "scenario.yaml"
+    file.write_text(simulate(scenario).config_text)
+    assert read_scenario(file) == scenario
+
+
+@pytest.mark.parametrize("example", sorted(EXAMPLES.glob("scenario-*.yaml")), ids=lambda path: path.stem)
+def test_examples_are_valid(example):
+    scenario = read_scenario(example)
+    assert scenario.outage_intervals()
+    assert len(scenario.rig().imus) == scenario.imus.count
+
+
+def test_the_example_of_the_demonstration_is_the_demonstration():
+    assert read_scenario(EXAMPLES / "scenario-demo.yaml") == demo()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sed: 1", r"line 1: sed: unknown key; did you mean seed\?"),
+        ("seed: 1\nimus: {count: 0}", r"line 2: imus.count: is 0; expected"),
+        ("imus:\n  mounts: [[x, y, w]]", r"line 2: imus.mounts\[0\]\[2\]: is 'w'; expected 'x'"),
+        ("imus:\n  mounts: [[x, y, -z]]", "expected right-handed"),
+        ("outages: {length_s: 3}", "outages.every_s: is missing"),
+        ("start: {north_m: 1, east_m: 3}", "expected latitude_deg and longitude_deg"),
+        ("duration_s: 60\ngnss: {lies: {count: 5000}}", "gnss.lies: 5000 lies among 0 fixes"),
+        ("errors: {turn_on_share: 1.5}", "errors.turn_on_share: is 1.5; expected"),
+    ],
+)
+def test_mistakes_are_named(tmp_path, text, message):
+    file = tmp_path / "scenario.yaml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=message):
+        simulate(file)

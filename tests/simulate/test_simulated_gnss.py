@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+from pymap3d import geodetic2ned
+
+from polyins.errors import InputError
+from polyins.simulate.gnss import fixes, with_lies
+from polyins.simulate.path import drive
+
+DRIVE = drive(200.0, static=20.0, seed=1)
+ANTENNA = np.array([-0.3, 0.2, -1.0])
+
+
+def offsets(position, truth):
+    """Return metres north, east, down from the truth to the positions, shape (M, 3)."""
+    return np.array([geodetic2ned(*p, *t, deg=False) for p, t in zip(position, truth, strict=True)])
+
+
+def test_perfect_fixes_are_the_antenna_s_true_states():
+    stream = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(0), position_std=0.0, velocity_std=0.0, phase=0.3)
+    truth = DRIVE.truth(stream.time, ANTENNA)
+    np.testing.assert_array_equal(stream.position, truth.position)
+    np.testing.assert_array_equal(stream.velocity, truth.velocity)
+    apart = offsets(stream.position, DRIVE.truth(stream.time).position)
+    np.testing.assert_allclose(np.linalg.norm(apart, axis=1), np.linalg.norm(ANTENNA), atol=1e-6)
+
+
+@pytest.mark.parametrize(("rate_hz", "phase", "count"), [(1.0, 0.3012, 200), (5.0, 0.0, 1001), (0.5, 1.5, 100)])
+def test_fixes_come_at_their_rate_and_phase(rate_hz, phase, count):
+    stream = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(0), position_std=1.0, rate_hz=rate_hz, phase=phase)
+    assert stream.time.size == count
+    assert stream.time[0] == phase
+    assert stream.time[-1] <= DRIVE.duration
+    np.testing.assert_allclose(np.diff(stream.time), 1.0 / rate_hz, atol=1e-12)
+    assert stream.velocity is None
+
+
+def test_noise_is_what_the_stream_claims():
+    std, velocity_std = np.array([0.5, 1.0, 2.0]), np.array([0.1, 0.2, 0.3])
+    rng = np.random.default_rng(2)
+    stream = fixes(DRIVE, ANTENNA, rng=rng, position_std=std, velocity_std=velocity_std, rate_hz=50.0)
+    truth = DRIVE.truth(stream.time, ANTENNA)
+    noise = offsets(stream.position, truth.position)
+    np.testing.assert_allclose(noise.std(axis=0), std, rtol=0.04)
+    np.testing.assert_allclose((stream.velocity - truth.velocity).std(axis=0), velocity_std, rtol=0.04)
+    np.testing.assert_array_equal(stream.position_std, np.tile(std, (stream.time.size, 1)))
+    np.testing.assert_array_equal(stream.velocity_std, np.tile(velocity_std, (stream.time.size, 1)))
+
+
+def test_lies_are_of_their_size_and_nowhere_else():
+    honest = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(3), position_std=0.01)
+    among = np.arange(50, 150)
+    lying, chosen = with_lies(honest, among, 8, 30.0, np.random.default_rng(4))
+    apart = offsets(lying.position, honest.position)
+    assert chosen.size == 8
+    assert np.isin(chosen, among).all()
+    np.testing.assert_array_equal(np.flatnonzero(np.abs(apart).max(axis=1) > 1.0), chosen)
+    np.testing.assert_allclose(np.linalg.norm(apart[chosen, :2], axis=1), 30.0, atol=1e-3)
+    np.testing.assert_allclose(apart[chosen, 2], 0.0, atol=1e-3)
+    np.testing.assert_array_equal(lying.position_std, honest.position_std)
+
+
+def test_more_lies_than_fixes_are_refused():
+    honest = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(3), position_std=0.01)
+    with pytest.raises(InputError, match="4 lies among 3 fixes"):
+        with_lies(honest, np.arange(3), 4, 30.0, np.random.default_rng(4))
