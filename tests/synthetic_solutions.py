@@ -77,6 +77,7 @@ def solution(truth: Drive, geodetic: bool = True, imus: int = 1, method: str = "
         velocity_variance=np.full((epochs, 3), 0.01),
         phi_covariance=np.tile([1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4], (epochs, 1)),
         point=np.zeros(3),
+        imus=imus,
         imu_names=tuple(f"imu{k + 1}" for k in range(imus)),
         imu_error_time=truth.time[::20],
         imu_errors=np.zeros((truth.time[::20].size, imus, 12)),

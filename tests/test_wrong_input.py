@@ -147,7 +147,11 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     "not gzip": (packed_wrongly, r"a\.txt\.gz", "expected a whole gzip file"),
     "cut gzip": (packed_and_cut, r"a\.txt\.gz", "expected a whole gzip file"),
     "cut binary": (binary_cut, r"a\.txt", "expected a multiple of 56"),
-    "text in numbers": (content("a.txt", b"1 2 3 4 5 6 7\n1 2 x 4 5 6 7\n"), r"a\.txt, line 2: 'x'", "expected a number"),
+    "text in numbers": (
+        content("a.txt", b"1 2 3 4 5 6 7\n1 2 x 4 5 6 7\n"),
+        r"a\.txt, line 2: 'x'",
+        "expected a number",
+    ),
     "short line": (content("a.txt", b"1 2 3 4 5 6 7\n1 2 3\n"), r"a\.txt, line 2: 3 columns", "expected 7"),
     "six columns": (content("a.txt", b"1 2 3 4 5 6\n"), r"a\.txt: 6 columns", r"expected 7 \(s, 3 rad, 3 m/s\)"),
     "text in a table": (
@@ -160,7 +164,11 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
         r"b\.csv, line 3: 3 columns",
         "expected 7",
     ),
-    "missing column": (columns("gyro", "names", to=["gx", "gyro_y", "gz"]), r"b\.csv: no column 'gyro_y'", "did you mean 'gy'"),
+    "missing column": (
+        columns("gyro", "names", to=["gx", "gyro_y", "gz"]),
+        r"b\.csv: no column 'gyro_y'",
+        "did you mean 'gy'",
+    ),
     "column number": (columns("time", "name", to=9), r"b\.csv: no column 9", "expected a number from 1 to 7"),
     # stamps
     "unsorted": (rows_of_a(swapped), r"a\.txt, line 9: time 100\.14", "expected increasing times"),
@@ -171,13 +179,24 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     "NaN time": (rows_of_b(at(3, 0, np.nan)), r"b\.csv, line 5: time is missing", "expected a number"),
     "time unit": (columns("time", "unit", to="us"), r"b\.csv", "is the unit of time"),
     "short": (
-        lambda folder, values: (rows_of_a(lambda r: r[:60])(folder, values), rows_of_b(lambda r: r[:60])(folder, values))[0],
+        lambda folder, values: (
+            rows_of_a(lambda r: r[:60])(folder, values),
+            rows_of_b(lambda r: r[:60])(folder, values),
+        )[0],
         "IMU a",
         "expected at least 2 s",
     ),
-    "no overlap": (setting("imus", 1, "clock_offset_s", to=9.0), r"IMU b begins at 109\.000 s and IMU a ends at 109\.980 s", "in common"),
+    "no overlap": (
+        setting("imus", 1, "clock_offset_s", to=9.0),
+        r"IMU b begins at 109\.000 s and IMU a ends at 109\.980 s",
+        "in common",
+    ),
     # units
-    "rates as increments": (rows_of_a(lambda rows: still_imu()), r"a\.txt", r"values look like rates; say unit: m/s\^2"),
+    "rates as increments": (
+        rows_of_a(lambda rows: still_imu()),
+        r"a\.txt",
+        r"values look like rates; say unit: m/s\^2",
+    ),
     "g as increments": (rows_of_a(scaled(slice(4, 7), 50 / GRAVITY)), r"a\.txt", "values look like rates in g"),
     "increments as rates": (rows_of_b(as_increments), r"b\.csv", "values look like increments; say unit: m/s"),
     "g as m/s^2": (rows_of_b(scaled(slice(4, 7), 1 / GRAVITY)), r"b\.csv", "say unit: g"),
@@ -188,15 +207,31 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     # axes
     "upside down": (rows_of_a(upside_down), r"imus\[0\]\.axes: IMU a", r"Try axes: \[x, -y, -z\]"),
     "on its side": (rows_of_b(on_its_side), r"imus\[1\]\.axes: IMU b", r"Try axes: \[x, -z, y\]"),
-    "left-handed axes": (setting("imus", 0, "axes", to=["x", "y", "-z"]), r"imus\[0\]\.axes", "left-handed; expected right-handed"),
+    "left-handed axes": (
+        setting("imus", 0, "axes", to=["x", "y", "-z"]),
+        r"imus\[0\]\.axes",
+        "left-handed; expected right-handed",
+    ),
     "axes twice": (setting("imus", 0, "axes", to=["x", "x", "z"]), r"imus\[0\]\.axes", "not a permutation of x, y, z"),
-    "unknown axis": (setting("imus", 0, "axes", to=["x", "q", "z"]), r"imus\[0\]\.axes", "not a permutation of x, y, z"),
+    "unknown axis": (
+        setting("imus", 0, "axes", to=["x", "q", "z"]),
+        r"imus\[0\]\.axes",
+        "not a permutation of x, y, z",
+    ),
     "two axes": (setting("imus", 0, "axes", to=["x", "y"]), r"imus\[0\]\.axes", "expected three of x, y, z"),
-    "mount of two": (setting("imus", 0, "mount_deg", to=[1, 2]), r"imus\[0\]\.mount_deg: is \[1, 2\]", "expected three numbers"),
+    "mount of two": (
+        setting("imus", 0, "mount_deg", to=[1, 2]),
+        r"imus\[0\]\.mount_deg: is \[1, 2\]",
+        "expected three numbers",
+    ),
     "mount of text": (setting("imus", 0, "mount_deg", to="level"), r"imus\[0\]\.mount_deg", "expected three numbers"),
     # rig
     "far IMU": (setting("imus", 1, "position_m", to=[3000, 0, 0]), r"imus\[1\].*position", "expected at most 100 m"),
-    "far antenna": (setting("gnss", "antenna_position_m", to=[0, 1500.0, 0]), r"gnss\.antenna_position_m", "expected at most 100 m"),
+    "far antenna": (
+        setting("gnss", "antenna_position_m", to=[0, 1500.0, 0]),
+        r"gnss\.antenna_position_m",
+        "expected at most 100 m",
+    ),
     "negative noise": (
         setting("imus", 0, "noise", to={"gyro_bias_deg_h": -1}),
         r"imus\[0\]\.noise\.gyro_bias_deg_h: is -1",
@@ -211,17 +246,53 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     "one name twice": (setting("imus", 1, "name", to="a"), r"drive\.yaml: imus", "two are named 'a'"),
     "no IMU": (setting("imus", to=[]), r"line \d+: imus", "is empty; expected at least one"),
     # keys
-    "unknown key": (setting("imus", 0, "noize", to=1), r"line \d+: imus\[0\]\.noize: unknown key", r"did you mean noise\?"),
+    "unknown key": (
+        setting("imus", 0, "noize", to=1),
+        r"line \d+: imus\[0\]\.noize: unknown key",
+        r"did you mean noise\?",
+    ),
     "unknown top key": (setting("gnns", to={}), r"line \d+: gnns: unknown key", r"did you mean gnss\?"),
-    "unknown key in defaults": (setting("imu_defaults", "rate", to=1), r"imu_defaults\.rate", r"did you mean rate_hz\?"),
+    "unknown key in defaults": (
+        setting("imu_defaults", "rate", to=1),
+        r"imu_defaults\.rate",
+        r"did you mean rate_hz\?",
+    ),
     "no file": (lambda folder, values: values["imus"][0].pop("file") and None, r"imus\[0\]\.file", "is missing"),
-    "text for a number": (setting("imus", 0, "clock_offset_s", to="soon"), r"imus\[0\]\.clock_offset_s: is 'soon'", "expected a number"),
-    "number for a switch": (setting("start", "estimate_gyro_bias", to=7), r"start\.estimate_gyro_bias: is 7", "expected a valid boolean"),
-    "unknown unit": (columns("gyro", "unit", to="rpm"), r"columns\.gyro\.unit: is 'rpm'", "expected 'rad/s', 'deg/s', 'rad' or 'deg'"),
-    "unknown time unit": (columns("time", "unit", to="h"), r"columns\.time\.unit: is 'h'", "expected 's', 'ms', 'us' or 'ns'"),
-    "unknown format": (setting("imus", 0, "format", to="novatel"), r"imus\[0\]\.format: is 'novatel'", "expected 'auto', 'xsens-dot'"),
-    "columns with another format": (setting("imus", 0, "columns", to=TABLE_COLUMNS), r"imus\[0\]: columns", "with format table only"),
-    "unknown dataset": (setting("dataset", to="quadrotr"), r"line \d+: dataset: .*'quadrotr'", r"did you mean quadrotor\?"),
+    "text for a number": (
+        setting("imus", 0, "clock_offset_s", to="soon"),
+        r"imus\[0\]\.clock_offset_s: is 'soon'",
+        "expected a number",
+    ),
+    "number for a switch": (
+        setting("start", "estimate_gyro_bias", to=7),
+        r"start\.estimate_gyro_bias: is 7",
+        "expected a valid boolean",
+    ),
+    "unknown unit": (
+        columns("gyro", "unit", to="rpm"),
+        r"columns\.gyro\.unit: is 'rpm'",
+        "expected 'rad/s', 'deg/s', 'rad' or 'deg'",
+    ),
+    "unknown time unit": (
+        columns("time", "unit", to="h"),
+        r"columns\.time\.unit: is 'h'",
+        "expected 's', 'ms', 'us' or 'ns'",
+    ),
+    "unknown format": (
+        setting("imus", 0, "format", to="novatel"),
+        r"imus\[0\]\.format: is 'novatel'",
+        "expected 'auto', 'xsens-dot'",
+    ),
+    "columns with another format": (
+        setting("imus", 0, "columns", to=TABLE_COLUMNS),
+        r"imus\[0\]: columns",
+        "with format table only",
+    ),
+    "unknown dataset": (
+        setting("dataset", to="quadrotr"),
+        r"line \d+: dataset: .*'quadrotr'",
+        r"did you mean quadrotor\?",
+    ),
     # positions
     "std of zero": (rows_of_gnss(at(2, 5, 0.0)), r"gnss\.txt, line 3: position std", "expected numbers above zero"),
     "negative std": (rows_of_gnss(at(1, 4, -0.1)), r"gnss\.txt, line 2: position std", "expected numbers above zero"),
@@ -236,7 +307,11 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     ),
     "no std": (gnss_table(), r"gnss: .*gnss\.csv has no position std", "expected position_std_m"),
     "latitude": (rows_of_gnss(at(0, 1, 114.4)), r"gnss\.txt, line 1: latitude 114\.4 deg", "expected at most 90"),
-    "no fix": (rows_of_gnss(lambda rows: rows * [1, 0, 0, 1, 1, 1, 1]), r"gnss\.txt, line 1: .* are 0", "expected rows with a fix"),
+    "no fix": (
+        rows_of_gnss(lambda rows: rows * [1, 0, 0, 1, 1, 1, 1]),
+        r"gnss\.txt, line 1: .* are 0",
+        "expected rows with a fix",
+    ),
     "degrees for radians": (
         gnss_table(position={"names": ["lat", "lon", "h"], "unit": "rad"}),
         r"gnss\.csv, line 2: latitude",
@@ -247,28 +322,84 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
         r"gnss\.columns\.position: .*unit m does not fit",
         "expected deg or rad",
     ),
-    "GNSS elsewhere": (setting("gnss", "clock_offset_s", to=1000.0), r"gnss\.txt: GNSS covers 1100\.5", "expected the same clock"),
-    "sea level": (setting("gnss", "height", to="sea-level"), r"gnss\.height", "need geoid_height_m; expected the height"),
+    "GNSS elsewhere": (
+        setting("gnss", "clock_offset_s", to=1000.0),
+        r"gnss\.txt: GNSS covers 1100\.5",
+        "expected the same clock",
+    ),
+    "sea level": (
+        setting("gnss", "height", to="sea-level"),
+        r"gnss\.height",
+        "need geoid_height_m; expected the height",
+    ),
     "two kinds of position": (reference_on_a_plane, "reference: positions are on a local plane", "expected one kind"),
     # times
-    "early start": (setting("start", "time_s", to=50.0), r"start\.time_s: is 50", r"within the data, 100\.000 to 109\.980"),
-    "late start": (setting("start", "time_s", to=200.0), r"start\.time_s: is 200", r"within the data, 100\.000 to 109\.980"),
-    "end before start": (setting("start", "end_time_s", to=99.0), r"start\.end_time_s: is 99", "expected a time after the start"),
-    "static interval": (setting("start", "static_interval_s", to=[90, 95]), r"start\.static_interval_s", "expected .from, to. within"),
-    "half a position": (setting("start", "position", to={"north_m": 1.0}), r"start\.position", "expected latitude_deg and longitude_deg, or"),
-    "outage outside": (setting("outages", to=[[103, 104], [300, 310]]), r"outages: \[300, 310\]", "is outside the data; expected"),
-    "outage backwards": (setting("outages", to=[[105, 103]]), r"outages: \[105, 103\]", "ends before it begins; expected"),
-    "outages overlap": (setting("outages", to=[[102, 105], [104, 106]]), r"outages: \[104, 106\]", "expected outages apart"),
-    "outage of three": (setting("outages", to=[[102, 105, 107]]), r"outages\[0\]: is \[102, 105, 107\]", "expected two numbers"),
-    "no outage fits": (setting("outages", to={"length_s": 30, "every_s": 90}), "outages: no outage of 30 s fits", "expected it to end"),
-    "endless outages": (setting("outages", to={"length_s": 30, "every_s": 30}), "outages", "expected more than length_s, 30"),
+    "early start": (
+        setting("start", "time_s", to=50.0),
+        r"start\.time_s: is 50",
+        r"within the data, 100\.000 to 109\.980",
+    ),
+    "late start": (
+        setting("start", "time_s", to=200.0),
+        r"start\.time_s: is 200",
+        r"within the data, 100\.000 to 109\.980",
+    ),
+    "end before start": (
+        setting("start", "end_time_s", to=99.0),
+        r"start\.end_time_s: is 99",
+        "expected a time after the start",
+    ),
+    "static interval": (
+        setting("start", "static_interval_s", to=[90, 95]),
+        r"start\.static_interval_s",
+        "expected .from, to. within",
+    ),
+    "half a position": (
+        setting("start", "position", to={"north_m": 1.0}),
+        r"start\.position",
+        "expected latitude_deg and longitude_deg, or",
+    ),
+    "outage outside": (
+        setting("outages", to=[[103, 104], [300, 310]]),
+        r"outages: \[300, 310\]",
+        "is outside the data; expected",
+    ),
+    "outage backwards": (
+        setting("outages", to=[[105, 103]]),
+        r"outages: \[105, 103\]",
+        "ends before it begins; expected",
+    ),
+    "outages overlap": (
+        setting("outages", to=[[102, 105], [104, 106]]),
+        r"outages: \[104, 106\]",
+        "expected outages apart",
+    ),
+    "outage of three": (
+        setting("outages", to=[[102, 105, 107]]),
+        r"outages\[0\]: is \[102, 105, 107\]",
+        "expected two numbers",
+    ),
+    "no outage fits": (
+        setting("outages", to={"length_s": 30, "every_s": 90}),
+        "outages: no outage of 30 s fits",
+        "expected it to end",
+    ),
+    "endless outages": (
+        setting("outages", to={"length_s": 30, "every_s": 30}),
+        "outages",
+        "expected more than length_s, 30",
+    ),
     "outages without GNSS": (
         lambda folder, values: (values.pop("gnss"), values.update(outages=[[102, 103]]))[1],
         "outages: given without gnss",
         "expected both or neither",
     ),
     "gate": (setting("filter", "gate_limit", to=-3), r"filter\.gate_limit: is -3", "expected a number above zero"),
-    "reopening": (setting("filter", "gate_reopen_after", to=0), r"filter\.gate_reopen_after: is 0", "expected greater than"),
+    "reopening": (
+        setting("filter", "gate_reopen_after", to=0),
+        r"filter\.gate_reopen_after: is 0",
+        "expected greater than",
+    ),
 }
 
 
@@ -283,6 +414,27 @@ def test_message_names_place_and_expectation(case: str, tmp_path: Path) -> None:
     assert re.search(place, message), message
     assert re.search(expectation, message), message
     assert len(message.splitlines()) <= 2
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_command_line_says_it_in_two_lines_and_exits_with_2(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from polyins.cli import main
+
+    spoil, place, _ = CASES[case]
+    values = write_recording(tmp_path)
+    spoil(tmp_path, values)
+    config = write_config(tmp_path, values)
+    monkeypatch.setattr("sys.argv", ["polyins", "run", str(config), "--out", str(tmp_path / "out"), "--json"])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    printed = capsys.readouterr()
+    assert stopped.value.code == 2
+    assert printed.out == ""
+    assert re.search(place, printed.err)
+    assert len(printed.err.strip().splitlines()) <= 2
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_recording_that_the_cases_spoil_loads_without_a_word(tmp_path: Path) -> None:

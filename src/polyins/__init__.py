@@ -1,3 +1,57 @@
-"""Navigation with several inertial measurement units."""
+"""Navigation with several inertial measurement units.
+
+    import polyins as pi
+    recording = pi.load("drive.yaml")
+    solution = pi.run(recording, method="enav-fusion")
+    scores = pi.evaluate(solution, recording.reference, outages=recording.outages)
+
+Frames: n is north-east-down, b an IMU's forward-right-down, a the array's. SI and radians inside; a name whose unit is
+not SI carries it. Shapes are time first.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from polyins import datasets as datasets
+    from polyins.batch import run as run
+    from polyins.compare import compare as compare
+    from polyins.errors import InputError as InputError
+    from polyins.evaluate.summary import summarize as evaluate
+    from polyins.load import load as load
+    from polyins.recording import Recording as Recording
+    from polyins.rig import Imu as Imu
+    from polyins.rig import NoiseGrade as NoiseGrade
+    from polyins.rig import Rig as Rig
+    from polyins.simulate.scenario import simulate as simulate
+    from polyins.solution import Solution as Solution
+
+_PUBLIC = {
+    "InputError": "errors",
+    "Imu": "rig",
+    "NoiseGrade": "rig",
+    "Recording": "recording",
+    "Rig": "rig",
+    "Solution": "solution",
+    "compare": "compare",
+    "evaluate": "evaluate.summary:summarize",
+    "load": "load",
+    "run": "batch",
+    "simulate": "simulate.scenario",
+}
+
+__all__ = ["__version__", "datasets", *_PUBLIC]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used, so that the command line starts fast."""
+    if name == "datasets":
+        return importlib.import_module("polyins.datasets")
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'polyins' has no attribute {name!r}")
+    module, _, attribute = _PUBLIC[name].partition(":")
+    return getattr(importlib.import_module(f"polyins.{module}"), attribute or name)

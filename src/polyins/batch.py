@@ -39,6 +39,27 @@ class Member:
     to_antenna: Array
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """A run laid out as arrays, ready for `engine.run_epochs`."""
+
+    method: Method
+    recording: Recording
+    aligned: Aligned
+    start: Start
+    members: list[Member]
+    state: State
+    plan: Plan
+    inputs: Inputs
+    outputs: Outputs
+    work: tuple[Array, Array] | None
+    """of the dense covariance"""
+
+    def advance(self, first: int, last: int) -> None:
+        """Take epochs first ... last - 1; the first of a run is 1."""
+        engine.run_epochs(self.state, self.plan, self.inputs, self.outputs, first, last, self.work)
+
+
 def run(
     recording: Recording,
     method: str = "enav-fusion",
@@ -53,6 +74,24 @@ def run(
     covariance is the papers' form with full matrices, there to be compared with. Raises InputError for a method that
     is unknown or data that give no start.
     """
+    prepared = prepare(recording, method, imu=imu, dense_covariance=dense_covariance)
+    begin = clock.perf_counter()
+    prepared.advance(1, 1)  # compiles the loop, or loads it from the cache
+    first_call_s = clock.perf_counter() - begin
+    epochs = len(prepared.inputs.time)
+    filter_s = 0.0
+    for first in range(1, epochs, CHUNK):
+        last = min(first + CHUNK, epochs)
+        begin = clock.thread_time()
+        prepared.advance(first, last)
+        filter_s += clock.thread_time() - begin
+        if progress:
+            progress(last / epochs)
+    return _solution(prepared, filter_s, first_call_s)
+
+
+def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance: bool = False) -> Prepared:
+    """Lay a run out, as `run` does before its first epoch."""
     row = find_method(method)
     if row.bank == "one":
         recording = recording.subset([imu])
@@ -61,33 +100,36 @@ def run(
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
     members = _members(row, recording.rig, start)
-    state = build_state(row, recording, members, start)
-    plan = build_plan(row, recording, aligned)
-    inputs = build_inputs(recording, aligned)
-    outputs = build_outputs(len(aligned.time), len(inputs.fix_time), len(members), plan.log_every)
-    work = dense.workspace() if dense_covariance else None
-    first_call_s = warm_up(state, plan, inputs, outputs, work)
-    filter_s = _run(state, plan, inputs, outputs, work, progress)
-    return _solution(row, recording, aligned, start, members, outputs, filter_s, first_call_s)
-
-
-
+    plan, inputs = build_plan(row, recording, aligned), build_inputs(recording, aligned)
+    return Prepared(
+        method=row,
+        recording=recording,
+        aligned=aligned,
+        start=start,
+        members=members,
+        state=build_state(row, recording, members, start, plan, inputs),
+        plan=plan,
+        inputs=inputs,
+        outputs=build_outputs(len(aligned.time), len(inputs.fix_time), len(members), plan.log_every),
+        work=dense.workspace() if dense_covariance else None,
+    )
 
 
 def _members(row: Method, rig: Rig, start: Start) -> list[Member]:
     if row.bank == "mean":
-        count = len(rig.imus)
-        virtual = Imu("mean", rig.imus[0].noise.averaged(count))
-        errors = start.imu_errors.mean(axis=0)
-        std = np.sqrt((start.imu_error_std**2).mean(axis=0) / count)
-        return [Member(virtual, errors, std, np.zeros(3), rig.antenna)]
+        # the papers give the virtual IMU the noise of one: then its gains are those of the other methods
+        virtual = Imu("mean", rig.imus[0].noise)
+        std = np.sqrt((start.imu_error_std**2).mean(axis=0))
+        return [Member(virtual, start.imu_errors.mean(axis=0), std, np.zeros(3), rig.antenna)]
     return [
         Member(imu, start.imu_errors[i], start.imu_error_std[i], -imu.position, rig.antenna - imu.position)
         for i, imu in enumerate(rig.imus)
     ]
 
 
-def build_state(row: Method, recording: Recording, members: list[Member], start: Start) -> State:
+def build_state(
+    row: Method, recording: Recording, members: list[Member], start: Start, plan: Plan, inputs: Inputs
+) -> State:
     """Lay out bank and covariance blocks for a method at its start."""
     count = len(members)
     spans = [(0, count)] if row.shares == "all" else [(i, i + 1) for i in range(count)]
@@ -97,20 +139,12 @@ def build_state(row: Method, recording: Recording, members: list[Member], start:
     metres = alignment.metric(start.position, recording.geodetic)
     for i, member in enumerate(members):
         _fill_lane(blocks[i // LANES], i % LANES, member, start, c, metres, 1.0 / count)
-    for block in blocks:
-        engine.strapdown.update_matrix(block)
-        engine.strapdown.update_sensitivity(block)
-        engine.strapdown.evaluate_at_own_state(block)
     groups = np.zeros((len(spans) + (len(spans) > 1), share.SIZE))
     for g, (first, last) in zip(groups, spans, strict=False):
         _fill_share(g, members[first:last], start, recording.rig)
     near = np.array([float(recording.geodetic), 0.0, 0.0, 1.0, recording.options.gravity])
     engine.move_near(near, start.position[0])
-    for block in blocks:
-        if recording.geodetic:
-            engine.earth.evaluate(block, near[1], near[2], near[3])
-        else:
-            engine.earth.evaluate_plane(block, near[4])
+    interval = inputs.time[1] - inputs.time[0]
     state = State(
         blocks=blocks,
         groups=groups,
@@ -118,10 +152,10 @@ def build_state(row: Method, recording: Recording, members: list[Member], start:
         measurements=np.zeros((len(spans), kalman.SIZE)),
         near=near,
         before=np.zeros(4),
-        clock=np.array([start.time, 1.0]),
+        clock=np.array([start.time, interval]),
         counters=np.zeros(3, dtype=np.int64),
     )
-    engine.merge(state)
+    engine.begin(state, plan, inputs.increments[0], interval)
     return state
 
 
@@ -212,60 +246,13 @@ def build_outputs(epochs: int, fixes: int, imus: int, log_every: int) -> Outputs
     )
 
 
-def warm_up(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, work: tuple[Array, Array] | None) -> float:
-    """Compile the loop, or load it from the cache, and return the seconds that took."""
-    begin = clock.perf_counter()
-    engine.run_epochs(state, plan, inputs, outputs, 1, 1, work)
-    return clock.perf_counter() - begin
-
-
-def _run(
-    state: State,
-    plan: Plan,
-    inputs: Inputs,
-    outputs: Outputs,
-    work: tuple[Array, Array] | None,
-    progress: Callable[[float], None] | None,
-) -> float:
-    epochs = len(inputs.time)
-    state.clock[1] = inputs.time[1] - inputs.time[0]
-    _set_previous(state, plan, inputs)
-    spent = 0.0
-    for first in range(1, epochs, CHUNK):
-        last = min(first + CHUNK, epochs)
-        begin = clock.thread_time()
-        engine.run_epochs(state, plan, inputs, outputs, first, last, work)
-        spent += clock.thread_time() - begin
-        if progress:
-            progress(last / epochs)
-    return spent
-
-
-def _set_previous(state: State, plan: Plan, inputs: Inputs) -> None:
-    """Let the increments that end at the start be the previous ones of the first epoch."""
-    interval = inputs.time[1] - inputs.time[0]
-    engine.load(state, plan, inputs.increments[0], interval)
-    for block in state.blocks:
-        engine.strapdown.compensate(block, 1.0, interval)
-        engine.strapdown.remember(block)
-
-
-def _solution(
-    row: Method,
-    recording: Recording,
-    aligned: Aligned,
-    start: Start,
-    members: list[Member],
-    outputs: Outputs,
-    filter_s: float,
-    first_call_s: float,
-) -> Solution:
+def _solution(run: Prepared, filter_s: float, first_call_s: float) -> Solution:
+    recording, aligned, outputs = run.recording, run.aligned, run.outputs
     states, variances = outputs.states[1:], outputs.variances[1:]
-    point = recording.rig.imus[0].position if row.bank == "one" else np.zeros(3)
-    inputs = build_inputs(recording, aligned)
+    point = recording.rig.imus[0].position if run.method.bank == "one" else np.zeros(3)
     status = outputs.fix_status
     return Solution(
-        method=row.name,
+        method=run.method.name,
         geodetic=recording.geodetic,
         time=aligned.time[1:],
         position=states[:, 0:3],
@@ -275,19 +262,20 @@ def _solution(
         velocity_variance=variances[:, 3:6],
         phi_covariance=variances[:, 6:12],
         point=point,
-        imu_names=tuple(member.imu.name for member in members),
+        imus=len(recording.imus),
+        imu_names=tuple(member.imu.name for member in run.members),
         imu_error_time=outputs.log_time,
         imu_errors=outputs.log[:, 0].transpose(0, 2, 1),
         imu_error_std=outputs.log[:, 1].transpose(0, 2, 1),
         innovations=Innovations(
-            time=inputs.fix_time,
+            time=run.inputs.fix_time,
             residual=outputs.innovations[:, 0:3],
             std=np.sqrt(outputs.innovations[:, 3:6]),
             nis=outputs.innovations[:, 6],
             accepted=(status & 3) != engine.REJECTED,
             reopened=(status & 3) == engine.REOPENED,
         ),
-        start={"time_s": start.time, **start.sources},
+        start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,
         warnings=recording.warnings + aligned.warnings,

@@ -42,6 +42,9 @@ DATASETS = {
 }
 
 
+RETRIES = 2
+
+
 def names() -> list[str]:
     """Return the names of the data sets that are known."""
     return list(DATASETS)
@@ -113,7 +116,7 @@ def _download(name: str, address: str) -> Path:
     import pooch
 
     folder = _cache_folder(name)
-    store = pooch.create(folder, address, registry=_registry(name), retry_if_failed=2)
+    store = pooch.create(folder, address, registry=_registry(name), retry_if_failed=RETRIES)
     for path in store.registry:
         try:
             store.fetch(path)

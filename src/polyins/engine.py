@@ -21,6 +21,10 @@ VELOCITY_REJECTED = 4
 """Added where the position of a fix was accepted and its velocity was not."""
 
 
+MOST_GROWTH = 100.0
+"""of the covariance when the gate reopens: standard deviations tenfold"""
+
+
 class State(NamedTuple):
     """What a run remembers."""
 
@@ -163,7 +167,7 @@ def aid_by_position(state: State, plan: Plan, fix: Array, innovation: Array) -> 
         state.counters[1] += 1
         if state.counters[1] <= plan.reopen_after:
             return REJECTED
-        _reopen(state)
+        _reopen(state, plan, nis)
         status = REOPENED
     state.counters[1] = 0
     _correct(state)
@@ -202,13 +206,22 @@ def _record(state: State, nis: float, innovation: Array) -> None:
 
 
 @kernel
-def _reopen(state: State) -> None:
-    """Let the position variance grow by the squared residual, so that the fix is believed."""
+def _reopen(state: State, plan: Plan, nis: float) -> None:
+    """Let the covariance grow until the fix is believable.
+
+    The filter is surer of itself than it should be, in velocity and attitude as much as in position, so P is scaled
+    as a whole; what is left of a jump that no error of this size explains goes to the position alone.
+    """
+    growth = min(nis / 3.0, MOST_GROWTH)
     for s in range(state.members.shape[0]):
         g, m = state.groups[s], state.measurements[s]
-        for a in range(3):
-            g[share.P + a * (share.STRIDE + 1)] += m[kalman.RESIDUAL + a] ** 2
+        for i in range(share.STATES * share.STRIDE):
+            g[share.P + i] *= growth
         kalman.gain(g, m)
+        if kalman.normalized_innovation_squared(m) > plan.gate_limit:
+            for a in range(3):
+                g[share.P + a * (share.STRIDE + 1)] += m[kalman.RESIDUAL + a] ** 2
+            kalman.gain(g, m)
 
 
 @kernel
@@ -249,6 +262,29 @@ def load(state: State, plan: Plan, raw: Array, interval: float) -> None:
         for k in range(6):
             for i in range(min(LANES, raw.shape[1] - b * LANES)):
                 w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
+
+
+@kernel
+def begin(state: State, plan: Plan, raw: Array, interval: float) -> None:
+    """Complete a state that holds positions, velocities, quaternions and errors.
+
+    The increments that end at the start are the previous ones of the first epoch.
+    """
+    load(state, plan, raw, interval)
+    for b in range(state.blocks.shape[0]):
+        w = state.blocks[b]
+        strapdown.update_matrix(w)
+        strapdown.update_sensitivity(w)
+        strapdown.evaluate_at_own_state(w)
+        if state.near[0] != 0.0:
+            earth.evaluate(w, state.near[1], state.near[2], state.near[3])
+        else:
+            earth.evaluate_plane(w, state.near[4])
+        strapdown.compensate(w, 1.0, interval)
+        strapdown.remember(w)
+    for s in range(state.members.shape[0]):
+        fuse.fuse_measurements(state.blocks, state.members[s, 0], state.members[s, 1], state.groups[s], interval)
+    merge(state)
 
 
 @kernel

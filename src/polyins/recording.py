@@ -101,11 +101,11 @@ class StartOptions:
 class FilterOptions:
     """What the filter is told beyond the rig."""
 
-    gate_limit: float | None = 50.0
-    """A fix is rejected whose normalized innovation squared exceeds this; None: no gate. Chi-square with three
-    degrees of freedom exceeds 50 once in 10^10."""
-    gate_reopen_after: int = 5
-    """After that many rejections in a row the next fix is believed and the position variance grows to match."""
+    gate_limit: float | None = 100.0
+    """A fix is rejected whose normalized innovation squared exceeds this; None: no gate. Ten sigma: what the errors of
+    real IMUs beyond their model make of good fixes after an outage stays below."""
+    gate_reopen_after: int = 3
+    """After that many rejections in a row the next fix is believed and the covariance grows to match."""
     gnss_snap: float = 1e-4
     """s: a fix nearer than this to an IMU epoch is applied at that epoch; otherwise the interval is split."""
     gravity: float = 9.80665

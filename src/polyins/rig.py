@@ -88,19 +88,6 @@ class NoiseGrade:
             correlation_time=correlation_time_h * HOUR,
         )
 
-    def averaged(self, count: int) -> NoiseGrade:
-        """Return the grade of the mean of `count` IMUs of this grade whose errors are independent."""
-        root = np.sqrt(count)
-        return NoiseGrade(
-            self.angle_random_walk / root,
-            self.velocity_random_walk / root,
-            self.gyro_bias_std / root,
-            self.accel_bias_std / root,
-            self.gyro_scale_std / root,
-            self.accel_scale_std / root,
-            self.correlation_time,
-        )
-
 
 @dataclass(frozen=True)
 class ImuErrors:

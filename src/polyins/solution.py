@@ -52,7 +52,10 @@ class Solution:
     """rad^2: NN, NE, ND, EE, ED, DD of the attitude error phi, shape (T, 6)"""
     point: Vector
     """the point that the solution describes, m, in the array frame"""
+    imus: int
+    """how many IMUs it is made from"""
     imu_names: tuple[str, ...]
+    """of the navigators; a virtual IMU is one"""
     imu_error_time: Array
     """s, shape (K,)"""
     imu_errors: Array

@@ -120,6 +120,36 @@ def test_rejected_residuals_stay_in_sight_and_tell_their_value(scene):
     assert np.all(rejected.customdata > 2.5)
 
 
+def test_three_sigma_are_drawn_at_the_fixes_and_not_between(scene):
+    bars = [trace for trace in innovation_figure(scene).data if trace.name == "3 sigma"]
+    innovations = scene.runs[0].solution.innovations
+    np.testing.assert_allclose(bars[0].error_y.array, 3.0 * innovations.std[:, 0], rtol=1e-6)
+    np.testing.assert_allclose(bars[0].x, innovations.time - 1000.0, atol=1e-3)
+    assert not any(30.0 <= x <= 60.0 for x in bars[0].x)
+
+
+def test_the_fix_after_an_outage_does_not_flatten_the_others(made_runs, made_recording):
+    made, summary = made_runs["single"]
+    shown = made.innovations
+    residual = shown.residual.copy()
+    residual[60, 0] = -500.0
+    scene = Scene.of(
+        {"single": (replace(made, innovations=replace(shown, residual=residual)), summary)}, made_recording, None
+    )
+    figure = innovation_figure(scene)
+    assert figure.layout.yaxis.range[1] < 1.0
+    drawn = named(figure, "residual")[0]
+    assert np.min(drawn.y) >= figure.layout.yaxis.range[0]
+    assert np.min(drawn.customdata) == -500.0
+
+
+def test_a_run_that_rejected_every_fix_is_drawn(made_runs, made_recording):
+    made, summary = made_runs["single"]
+    none = replace(made.innovations, accepted=np.zeros_like(made.innovations.accepted))
+    scene = Scene.of({"single": (replace(made, innovations=none), summary)}, made_recording, None)
+    assert len(named(innovation_figure(scene), "rejected")) == 3
+
+
 def test_without_reference_fixes_or_outages_the_rest_is_drawn(blind):
     assert [trace.name for trace in trajectory_figure(blind).data] == ["enav-fusion"]
     assert outage_figure(blind) is None

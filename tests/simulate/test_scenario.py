@@ -93,6 +93,11 @@ def test_a_seed_repeats_and_another_differs():
     assert YAML(typ="safe").load(other.config_text)["seed"] == 1
 
 
+def test_a_negative_seed_is_refused():
+    with pytest.raises(InputError, match="seed is -1; expected"):
+        simulate(SHORT, seed=-1)
+
+
 def test_lies_are_told_where_the_filter_sees_them():
     lying = Fixes(rate_hz=5.0, lies=Lies(count=20, size_m=40.0))
     simulation = simulate_with_truth(changed(gnss=lying))
@@ -109,6 +114,7 @@ def test_lies_are_told_where_the_filter_sees_them():
 def test_without_a_receiver_there_is_no_gnss():
     recording = simulate(changed(gnss=None))
     assert recording.gnss is None
+    assert recording.outages == recording.warnings == ()
     assert YAML(typ="safe").load(recording.config_text)["gnss"] is None
 
 
@@ -128,6 +134,12 @@ def test_sixteen_imus_fill_a_square():
 def test_an_outage_schedule_counts_from_the_standing_start_and_ends_in_time():
     scenario = Scenario(duration_s=400.0, static_s=60.0, outages=OutageSchedule(length_s=30.0, every_s=90.0))
     assert scenario.outage_intervals() == ((120.0, 150.0), (210.0, 240.0), (300.0, 330.0))
+
+
+def test_a_drive_too_short_for_an_outage_says_so():
+    scenario = changed(outages=OutageSchedule(length_s=30.0, every_s=90.0))
+    assert simulate(scenario).warnings == ("outages: the drive is too short for one",)
+    assert simulate(SHORT).warnings == simulate(changed(outages=())).warnings == ()
 
 
 def test_the_demonstration_has_four_outages_of_thirty_seconds():
@@ -172,7 +184,12 @@ def test_the_example_of_the_demonstration_is_the_demonstration():
         ("imus:\n  mounts: [[x, y, -z]]", "expected right-handed"),
         ("outages: {length_s: 3}", "outages.every_s: is missing"),
         ("start: {north_m: 1, east_m: 3}", "expected latitude_deg and longitude_deg"),
-        ("duration_s: 60\ngnss: {lies: {count: 5000}}", "gnss.lies: 5000 lies among 0 fixes"),
+        ("duration_s: 100\ngnss: {lies: {count: 5000}}", "gnss.lies: 5000 lies among 40 fixes"),
+        ("duration_s: 50", "static_s is 60; expected within the 50 s of duration_s"),
+        ("rate_hz: 0.001", "rate_hz is 0.001; expected at least two samples within"),
+        ("gnss: {phase_s: 2000}", "gnss.phase_s is 2000; expected within"),
+        ("outages: [[150, 120]]", r"outages: \[150, 120\]; expected \[from, to\] within"),
+        ("outages: [[900, 1001]]", r"outages: \[900, 1001\]; expected"),
         ("errors: {turn_on_share: 1.5}", "errors.turn_on_share: is 1.5; expected"),
     ],
 )

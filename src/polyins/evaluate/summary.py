@@ -35,8 +35,8 @@ def summarize(solution: Solution, reference: Reference | None, outages: Sequence
     document = {
         "polyins": __version__,
         "method": solution.method,
-        "imus": len(solution.imu_names),
-        "rate_hz": 1.0 / np.median(np.diff(solution.time)) if epochs > 1 else None,
+        "imus": solution.imus,
+        "rate_hz": round(1.0 / float(np.median(np.diff(solution.time))), 6) if epochs > 1 else None,
         "duration_s": solution.time[-1] - solution.time[0] if epochs else 0.0,
         "epochs": epochs,
         "filter_s": solution.filter_s,

@@ -261,4 +261,3 @@ def _uneven(time: Array) -> list[str]:
     if spread > JITTER:
         texts.append(f"intervals vary by {100 * spread:.0f} % (95 % of them by less); expected an even rate")
     return texts
-

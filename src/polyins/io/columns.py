@@ -51,6 +51,8 @@ def read_columns(
     if content[:4] == PARQUET_MAGIC:
         return Source(str(find(path))), _parquet_columns(path, content, wanted)
     table = layout(path, content, header_has)
+    if not content.isascii():
+        content = content.decode(errors="replace").encode()
     if table.delimiter == " ":
         content = re.sub(rb"(?m)^[ \t]+|[ \t]+$", b"", content)
         content = re.sub(rb"[ \t]+", b" ", content)
@@ -113,9 +115,9 @@ def _text_columns(path: Path, content: bytes, table: Layout, places: list[int], 
     try:
         columns = _parse(path, content, table, places, float64())
     except ArrowInvalid:
-        from pyarrow import string
+        from pyarrow import binary
 
-        cells = _parse(path, content, table, places, string())
+        cells = _parse(path, content, table, places, binary())
         return [_numbers(path, table, place, column, text_is_nan) for place, column in zip(places, cells, strict=True)]
     return [column.to_numpy() for column in columns]
 
@@ -152,7 +154,8 @@ def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: A
 def _numbers(path: Path, table: Layout, place: int, cells: Any, text_is_nan: bool) -> Array:
     """Convert cell by cell, to find the one that is not a number."""
     values = np.full(len(cells), np.nan)
-    for row, text in enumerate(cells.to_pylist()):
+    for row, cell in enumerate(cells.to_pylist()):
+        text = cell.decode(errors="replace")
         if _is_number(text):
             values[row] = float(text)
         elif text.strip() and not text_is_nan:

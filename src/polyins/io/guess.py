@@ -115,8 +115,14 @@ def _named(names: Sequence[str], patterns: Sequence[str]) -> list[str] | None:
 
 def _imu_columns(path: str | Path, time: str, gyro: list[str], accel: list[str]) -> tuple[ImuColumns, tuple[str, ...]]:
     _, values = read_columns(path, [time, *gyro, *accel])
+    steps = np.diff(values[0])
+    usual = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 0.0
+    if not usual > 0.0 or not np.isfinite(values[1:]).any(axis=1).all():
+        raise InputError(
+            f"{find(path)}: {len(values[0])} row(s) without increasing times and values; expected IMU data"
+        )
     time_unit = _time_unit(values[0], LIKELY_RATES_HZ)
-    step = float(np.median(np.diff(values[0]))) * table.SECONDS[time_unit]
+    step = usual * table.SECONDS[time_unit]
     force = float(np.nanmedian(np.linalg.norm(values[4:7], axis=0)))
     accel_unit = min(
         ("m/s^2", "g", "m/s"),
@@ -167,7 +173,8 @@ def _track_columns(
 
 def _time_unit(stamps: Array, rates: tuple[float, float]) -> str:
     """Return the first unit that makes the rate a likely one."""
-    step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 1.0
+    steps = np.diff(stamps)
+    step = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 1.0
     for unit, length in table.SECONDS.items():
         if step > 0 and rates[0] <= 1.0 / (step * length) <= rates[1]:
             return unit

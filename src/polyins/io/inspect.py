@@ -38,6 +38,25 @@ def describe(stream: Stream) -> Facts:
     return {**facts, **_timing(stream.time), **(_imu(stream) if isinstance(stream, ImuRows) else _positions(stream))}
 
 
+def listing(facts: Facts, indent: str = "") -> str:
+    """Return facts as indented lines for a reader; what is not known is left out."""
+    lines = []
+    for key, value in facts.items():
+        items = value if isinstance(value, list) and value and isinstance(value[0], dict) else [value]
+        for item in items:
+            if isinstance(item, dict):
+                lines += [f"{indent}{key}:", listing(item, indent + "  ")]
+            elif item not in (None, []):
+                lines.append(f"{indent}{key}: {_in_words(item)}")
+    return "\n".join(lines)
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(_in_words(item) for item in value)
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
 def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
     """Say what `load` would refuse or warn of."""
     try:

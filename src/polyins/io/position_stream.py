@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,13 @@ from polyins.config import GnssEntry, ReferenceEntry
 from polyins.errors import InputError
 from polyins.io import checks, kf_gins, rtklib, table
 from polyins.io.files import find
-from polyins.io.recognize import track_format
+from polyins.io.guess import read_stream
+from polyins.io.recognize import data_format, track_format
 from polyins.io.rows import Track
 from polyins.io.yaml_document import Document
 from polyins.recording import Array, GnssStream, Reference
 from polyins.rig import check_lever_arm
+from polyins.solution import Solution
 
 Span = tuple[float, float]
 
@@ -102,6 +105,33 @@ def read_reference(entry: ReferenceEntry, document: Document, span: Span) -> tup
         check_lever_arm("point", np.array(entry.point_m))
     reference = Reference(track.time, track.position, track.velocity, track.attitude, np.array(entry.point_m))
     return reference, track.geodetic, warnings
+
+
+def load_reference(path: str | Path, solution: Solution) -> Reference:
+    """Read a file of positions, or the reference of a configuration, to judge a solution by.
+
+    A file of positions is taken to describe the solution's own point, on its clock. Raises InputError if it has no
+    time in common with the solution, or positions of the other kind (geodetic, local plane).
+    """
+    if data_format(path) == "configuration":
+        from polyins.load import load
+
+        recording = load(path)
+        if recording.reference is None:
+            raise InputError(f"{path}: has no reference; expected that section, or a file of positions")
+        reference, geodetic = recording.reference, recording.geodetic
+    else:
+        track, _ = read_stream(path)
+        if not isinstance(track, Track):
+            raise InputError(f"{path}: holds IMU data; expected positions")
+        checks.check_track(track, "reference")
+        checks.check_within(track.source, "reference", track.time, (solution.time[0], solution.time[-1]))
+        reference = Reference(track.time, track.position, track.velocity, track.attitude, solution.point)
+        geodetic = track.geodetic
+    if geodetic != solution.geodetic:
+        kinds = {True: "latitude and longitude", False: "metres on a local plane"}
+        raise InputError(f"{path}: holds {kinds[geodetic]}; expected {kinds[solution.geodetic]} as in the solution")
+    return reference
 
 
 def _at_position_times(track: Track, lag: float) -> Track:

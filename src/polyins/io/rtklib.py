@@ -82,6 +82,8 @@ def _rows(path: Path, numbered: list[tuple[int, str]]) -> Array:
             rows.append([float(text) for text in re.sub(r"[/:,]", " ", line).split()])
         except ValueError as error:
             raise InputError(f"{path}, line {number}: {error}; expected a row of numbers") from error
+        if not np.isfinite(rows[-1]).all():
+            raise InputError(f"{path}, line {number}: a value is not finite; expected a row of numbers")
         if len(rows[-1]) != len(rows[0]):
             raise InputError(f"{path}, line {number}: {len(rows[-1])} values; expected {len(rows[0])} as before")
     if len(rows[0]) < 10:

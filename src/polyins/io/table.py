@@ -10,7 +10,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.io.columns import Column, column_names, read_columns
-from polyins.io.files import plain_suffix, whole
+from polyins.io.files import plain_suffix, write_bytes
 from polyins.io.rows import ImuRows, Source, Track, intervals
 from polyins.recording import Array, GnssStream, ImuStream
 from polyins.rig import DEG
@@ -172,14 +172,11 @@ def _north_east_first(values: Array, frame: str) -> Array:
 
 
 def _write(path: str | Path, names: Sequence[str], values: Sequence[Array]) -> None:
-    from pyarrow import csv, parquet
+    from pyarrow import BufferOutputStream, csv, parquet
     from pyarrow import table as arrow_table
 
     rows = np.column_stack(values)
     table = arrow_table({name: rows[:, n] for n, name in enumerate(names)})
-    if plain_suffix(path) == ".parquet":
-        with whole(path) as beside:
-            parquet.write_table(table, beside)
-    else:
-        with whole(path) as beside:
-            csv.write_csv(table, beside)
+    content = BufferOutputStream()
+    (parquet.write_table if plain_suffix(path) == ".parquet" else csv.write_csv)(table, content)
+    write_bytes(path, content.getvalue().to_pybytes())

@@ -67,9 +67,7 @@ def _array(values: tuple[float, ...] | None, unit: float = 1.0) -> Array | None:
     return None if values is None else np.array(values) * unit
 
 
-def outage_intervals(
-    config: Config, document: Document, span: Span, gnss: GnssStream | None
-) -> tuple[Span, ...]:
+def outage_intervals(config: Config, document: Document, span: Span, gnss: GnssStream | None) -> tuple[Span, ...]:
     """Return the outages in order; a schedule gives the whole ones within the GNSS and IMU data.
 
     Raises InputError for outages without GNSS, outside the data, overlapping, or that end before they begin.

@@ -87,8 +87,9 @@ def _bridged(source: Source, time: Array, values: Array) -> tuple[Array, list[st
                 f"expected at most {LONGEST_BRIDGE}, which are interpolated"
             )
         warnings.append(f"{source.place(int(run[0]))}: {len(run)} row(s) without a valid {names}; interpolated")
+    if len(damaged) == len(values):
+        raise InputError(f"{source.path}: no valid row of Acc and Gyr; expected at least one")
     for axis in range(6) if len(damaged) else ():
         good = fine[:, axis]
         values[~good, axis] = np.interp(time[~good], time[good], values[good, axis])
     return values, warnings
-

@@ -20,12 +20,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AXES = ("north (m)", "east (m)", "down (m)")
+USUAL = 0.95
+"""share of the accepted fixes that lie well inside the vertical range"""
 
 
 def innovation_figure(scene: Scene) -> Figure | None:
     """Draw the residuals with their predicted three sigma, one method at a time; None without fixes.
 
-    The vertical range is that of the accepted residuals; rejected ones beyond it are drawn at the edge.
+    Residuals beyond the vertical range are drawn at its edge.
     """
     runs = [run for run in scene.runs if run.solution.innovations.time.size]
     if not runs:
@@ -36,7 +38,7 @@ def innovation_figure(scene: Scene) -> Figure | None:
     owners = []
     for index, run in enumerate(runs):
         for row in range(len(AXES)):
-            traces = [*_band(scene, run, row, points), *_residuals(scene, run, row, limits[row], points)]
+            traces = [_three_sigma(scene, run, row, points), *_residuals(scene, run, row, limits[row], points)]
             figure.add_traces(traces, rows=row + 1, cols=1)
             owners += [index] * len(traces)
     mark_time(figure, scene.duration, scene.outages)
@@ -48,30 +50,37 @@ def innovation_figure(scene: Scene) -> Figure | None:
 
 
 def _limits(innovations: Innovations) -> Array:
-    """Return the greatest accepted residual or three sigma, m, shape (3,)."""
-    accepted = np.abs(innovations.residual[innovations.accepted])
-    limits: Array = np.fmax(3.0 * innovations.std.max(axis=0), accepted.max(axis=0, initial=0.0))
-    return limits
+    """Return half the height of each row, m, shape (3,): the few fixes that end an outage do not decide it."""
+    accepted = innovations.accepted
+    if not accepted.any():
+        return np.asarray(3.0 * innovations.std.max(axis=0), dtype=float)
+    reach = np.fmax(3.0 * innovations.std[accepted], np.abs(innovations.residual[accepted]))
+    return np.asarray(np.fmin(1.5 * np.quantile(reach, USUAL, axis=0), reach.max(axis=0)), dtype=float)
 
 
-def _band(scene: Scene, run: Run, row: int, points: int) -> Iterator[Any]:
+def _three_sigma(scene: Scene, run: Run, row: int, points: int) -> Any:
+    """Draw a bar for each fix, not a band: between fixes, above all in outages, nothing was predicted."""
     from plotly.graph_objects import Scatter
 
     innovations = run.solution.innovations
     drawn = kept_for_display(innovations.std[:, [row]], points)
-    for sign, fill in ((1.0, None), (-1.0, "tonexty")):
-        yield Scatter(
-            x=scene.since_start(innovations.time[drawn]),
-            y=(sign * 3.0 * innovations.std[drawn, row]).astype(np.float32),
-            name="3 sigma",
-            legendgroup="3 sigma",
-            showlegend=row == 0 and sign > 0.0,
-            mode="lines",
-            line={"color": transparent(run.colour, 0.5), "width": 0.8},
-            fill=fill,
-            fillcolor=transparent(run.colour, 0.12),
-            hoverinfo="skip",
-        )
+    bars = {
+        "array": (3.0 * innovations.std[drawn, row]).astype(np.float32),
+        "color": transparent(run.colour, 0.17),
+        "thickness": float(np.clip(900.0 / drawn.size, 1.0, 5.0)),
+        "width": 0,
+    }
+    return Scatter(
+        x=scene.since_start(innovations.time[drawn]),
+        y=np.zeros(drawn.size, dtype=np.float32),
+        error_y=bars,
+        name="3 sigma",
+        legendgroup="3 sigma",
+        showlegend=row == 0,
+        mode="markers",
+        marker={"color": transparent(run.colour, 0.4), "size": 1},
+        hoverinfo="skip",
+    )
 
 
 def _residuals(scene: Scene, run: Run, row: int, limit: float, points: int) -> Iterator[Any]:

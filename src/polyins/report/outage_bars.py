@@ -30,7 +30,7 @@ def outage_figure(scene: Scene) -> Figure | None:
         for run in scene.runs
     ]
     figure = finish(Figure(bars), height=380)
-    figure.update_layout(barmode="group", bargap=0.25)
+    figure.update_layout(barmode="group", bargap=max(0.25, 0.8 - 0.05 * len(intervals) * len(bars)))
     figure.update_xaxes(title_text="outage", tickformat="d", nticks=min(30, len(intervals) + 1), showgrid=False)
     figure.update_yaxes(title_text="max. horizontal error (m)", rangemode="tozero")
     return figure

@@ -35,8 +35,8 @@ SECTIONS: tuple[tuple[str, str, str, Callable[[Scene], Figure | None]], ...] = (
     (
         "innovations",
         "Innovations",
-        "Predicted minus measured position of the antenna, at each fix that the filter was shown. Rejected ones beyond "
-        "the range are drawn at its edge.",
+        "Predicted minus measured position of the antenna at each fix that the filter was shown, and three times the "
+        "standard deviation that it expected. What lies beyond the range is drawn at its edge.",
         innovation_figure,
     ),
 )

@@ -33,7 +33,14 @@ def finish(figure: Figure, height: int) -> Figure:
         paper_bgcolor="white",
         plot_bgcolor="white",
         margin={"l": 64, "r": 16, "t": 16, "b": 48},
-        legend={"orientation": "h", "x": 0.0, "y": 1.02, "yanchor": "bottom", "groupclick": "togglegroup"},
+        legend={
+            "orientation": "h",
+            "x": 0.0,
+            "y": 1.02,
+            "yanchor": "bottom",
+            "groupclick": "togglegroup",
+            "itemsizing": "constant",
+        },
         hoverlabel={"font": {"family": FONT}},
         hovermode="closest",
         showlegend=True,
@@ -95,7 +102,10 @@ def choose(figure: Figure, labels: Sequence[str], owners: Sequence[int], first: 
     ]
     for trace, owner in zip(figure.data, owners, strict=True):
         trace.visible = owner == first
-    figure.update_layout(legend={"y": 0.0, "yref": "container", "yanchor": "bottom"}, margin={"t": 72, "b": 100})
+    figure.update_layout(
+        legend={"y": 0.0, "yref": "container", "yanchor": "bottom"},
+        margin={"t": 72 if len(labels) > 1 else 56, "b": 100},
+    )
     if len(labels) > 1:
         figure.update_layout(
             updatemenus=[

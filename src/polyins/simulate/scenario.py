@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from polyins.config import (
     Noise,
@@ -145,6 +145,20 @@ class Scenario(Section):
     reference_rate_hz: Positive = 10.0
     """of the true states, which serve as the reference"""
 
+    @model_validator(mode="after")
+    def _fits_its_duration(self) -> Self:
+        inside = f"expected within the {self.duration_s:g} s of duration_s"
+        if self.static_s >= self.duration_s:
+            raise ValueError(f"static_s is {self.static_s:g}; {inside}")
+        if self.duration_s * self.rate_hz < 2.0:
+            raise ValueError(f"rate_hz is {self.rate_hz:g}; expected at least two samples {inside[9:]}")
+        if self.gnss and self.gnss.phase_s >= self.duration_s:
+            raise ValueError(f"gnss.phase_s is {self.gnss.phase_s:g}; {inside}")
+        for begin, end in self.outage_intervals():
+            if not 0.0 <= begin < end <= self.duration_s:
+                raise ValueError(f"outages: [{begin:g}, {end:g}]; expected [from, to] {inside[9:]}")
+        return self
+
     def rig(self) -> Rig:
         """Return what is mounted where."""
         grade = noise_grade(self.noise)
@@ -155,7 +169,12 @@ class Scenario(Section):
         return Rig(tuple(imus), np.array(self.gnss.antenna_position_m if self.gnss else (0.0, 0.0, 0.0)))
 
     def outage_intervals(self) -> tuple[tuple[float, float], ...]:
-        """Return begin and end of the outages, s; of a schedule those that end before the drive does."""
+        """Return begin and end of the outages, s; of a schedule those that end before the drive does.
+
+        Without a receiver there are none.
+        """
+        if self.gnss is None:
+            return ()
         if not isinstance(self.outages, OutageSchedule):
             return self.outages
         length, every, after = self.outages.length_s, self.outages.every_s, self.outages.first_after_s
@@ -215,6 +234,8 @@ def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, se
     if isinstance(scenario, str | FilePath):
         scenario = read_scenario(scenario)
     scenario = scenario or Scenario()
+    if seed is not None and seed < 0:
+        raise InputError(f"seed is {seed}; expected a whole number that is not negative")
     if seed is not None:
         scenario = scenario.model_copy(update={"seed": seed})
     drive_seed, gnss_seed, imu_seed = np.random.SeedSequence(scenario.seed).spawn(3)
@@ -225,6 +246,7 @@ def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, se
         _sense(imu, exact, imperfections, np.random.default_rng(own_seed))
         for imu, own_seed in zip(rig.imus, imu_seed.spawn(len(rig.imus)), strict=True)
     ]
+    too_short = bool(scenario.gnss and scenario.outages) and not scenario.outage_intervals()
     still = (float(exact.time[0]), scenario.static_s)
     stream, lies = _receive(scenario, path, np.random.default_rng(gnss_seed))
     recording = Recording(
@@ -235,6 +257,7 @@ def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, se
         outages=scenario.outage_intervals(),
         start=StartOptions(static_interval=still if still[0] < still[1] else None),
         name=scenario.name,
+        warnings=("outages: the drive is too short for one",) if too_short else (),
         config_text=write_yaml(scenario.model_dump(mode="json")),
     )
     return Simulation(recording, path, tuple(errors for _, errors in sensed), lies)

@@ -1,0 +1,5 @@
+"""`python -m polyins`."""
+
+from polyins.cli import main
+
+main()

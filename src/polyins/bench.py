@@ -1,0 +1,83 @@
+"""What an epoch costs: every method against the dense, paper-shaped single filter, in one run."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from polyins import batch
+from polyins.recording import Recording
+
+ROUNDS = 9
+SECONDS = 60.0
+
+CASES = (
+    ("dense/single", "single", 1, True),
+    ("single", "single", 1, False),
+    ("imu-fusion/16", "imu-fusion", 16, False),
+    ("enav-fusion/16", "enav-fusion", 16, False),
+    ("enav-fusion/100", "enav-fusion", 100, False),
+    ("nav-fusion/16", "nav-fusion", 16, False),
+    ("dense/enav-fusion/16", "enav-fusion", 16, True),
+    ("dense/nav-fusion/16", "nav-fusion", 16, True),
+)
+"""name, method, IMUs, dense covariance"""
+
+
+def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
+    """Return the `bench` document: CPU time per epoch (200 Hz IMU, 1 Hz GNSS), compilation left out.
+
+    The cases take turns, and each ratio is the median of those within a round, so that a change in the machine's
+    speed does not enter.
+    """
+    recordings = {count: array(count) for count in sorted({case[2] for case in CASES})}
+    cost = np.empty((ROUNDS, len(CASES)))
+    for k in range(-1, ROUNDS):  # a first round warms up
+        for j, (_, method, count, dense) in enumerate(CASES):
+            solution = batch.run(recordings[count], method, dense_covariance=dense)
+            cost[k, j] = 1e6 * solution.filter_s / len(solution.time)
+        if progress:
+            progress((k + 2) / (ROUNDS + 1))
+    ratios = np.median(cost / cost[:, :1], axis=0)
+    return {
+        "machine": {
+            "processor": _processor(),
+            "cores": os.cpu_count(),
+            "system": platform.platform(),
+            "python": platform.python_version(),
+        },
+        "results": [
+            {
+                "name": name,
+                "us_per_epoch": float(np.median(cost[:, j])),
+                "ratio_to_dense": float(ratios[j]),
+                "runs": ROUNDS,
+                "min": float(cost[:, j].min()),
+                "median": float(np.median(cost[:, j])),
+            }
+            for j, (name, *_) in enumerate(CASES)
+        ],
+    }
+
+
+def array(count: int) -> Recording:
+    """Return a simulated recording of an array of `count` IMUs; those beyond sixteen repeat the first ones."""
+    from polyins.simulate.scenario import Scenario, simulate
+
+    recording = simulate(Scenario(duration_s=SECONDS))
+    order = [i % len(recording.imus) for i in range(count)]
+    imus = tuple(replace(recording.rig.imus[i], name=f"imu{k}") for k, i in enumerate(order, 1))
+    return replace(recording, rig=replace(recording.rig, imus=imus), imus=tuple(recording.imus[i] for i in order))
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo") as file:
+            return next(line.split(":", 1)[1].strip() for line in file if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor()

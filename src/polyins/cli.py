@@ -1,0 +1,286 @@
+"""The commands: parse, call, print."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+import click
+
+from polyins import __version__
+from polyins.errors import InputError
+from polyins.screen import announce_compilation, number, print_summaries, print_table, progress, say
+
+FOLDER = click.Path(file_okay=False, path_type=Path)
+FILE = click.Path(path_type=Path)
+
+as_json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document and nothing else.")
+no_report_option = click.option("--no-report", is_flag=True, help="Leave out report.html.")
+
+
+def out_option(default: str) -> Any:
+    """Return the option that names the folder of a command's files."""
+    text = "Folder for the files; what is there under the same names is replaced."
+    return click.option("--out", type=FOLDER, default=default, show_default=True, help=text)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="polyins")
+@click.option("--debug", is_flag=True, help="Show a traceback when something fails; allowed anywhere.")
+def cli(debug: bool) -> None:
+    """Navigation with several inertial measurement units."""
+
+
+def main() -> None:
+    """Run the command line; exit 0 if done, 1 if it failed while running, 2 if command line or input are wrong."""
+    arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
+    debug = len(arguments) < len(sys.argv) - 1
+    try:
+        cli.main(arguments, prog_name="polyins", standalone_mode=False)
+    except click.exceptions.Exit as exit_:
+        sys.exit(exit_.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except click.Abort:
+        say("polyins: stopped")
+        sys.exit(1)
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        elif isinstance(error, InputError):
+            say(f"polyins: {error}")
+        else:
+            say(f"polyins: failed: {type(error).__name__}: {error}\n(--debug shows where)")
+        sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+@cli.command()
+@out_option("polyins-demo")
+def demo(out: Path) -> None:
+    """Simulate a drive with an array of 16 IMUs, run every array method, show table and report."""
+    from polyins.simulate import files, scenario
+
+    say("simulating a drive with 16 IMUs and GNSS ...")
+    recording = scenario.simulate(scenario.demo())
+    config = files.write(recording, out / "recording")
+    say(f"recording: {config}")
+    _compare(config, None, out, as_json=False, report=True)
+
+
+@cli.command()
+@click.argument("config", type=FILE)
+@click.option("--method", default=None, help="A row of the method table; enav-fusion, or single with one IMU.")
+@click.option("--imu", default=None, help="The IMU that `single` uses, by name; the first unless given.")
+@out_option("polyins-out")
+@as_json_option
+@no_report_option
+def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool) -> None:
+    """Run one method over one recording (polyins YAML, or a KF-GINS configuration)."""
+    from polyins import batch, results
+    from polyins.evaluate.summary import summarize
+    from polyins.load import load
+    from polyins.methods import find_method
+
+    if method is not None:
+        find_method(method)
+    recording = load(config)
+    name = method or ("enav-fusion" if len(recording.imus) > 1 else "single")
+    index = _imu_index([one.name for one in recording.rig.imus], imu)
+    announce_compilation()
+    with progress(name) as update:
+        solution = batch.run(recording, name, imu=index, progress=update)
+    summary = summarize(solution, recording.reference, recording.outages)
+    results.write_run(out, recording, solution, summary, report=not no_report)
+    if as_json:
+        print(results.as_json(summary))
+        return
+    print_summaries(recording.name, {name: summary}, {})
+    say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+
+
+def _imu_index(names: list[str], wanted: str | None) -> int:
+    if wanted is None:
+        return 0
+    if wanted not in names:
+        raise InputError(f"--imu {wanted}: is not in the recording; expected one of {', '.join(names)}")
+    return names.index(wanted)
+
+
+@cli.command()
+@click.argument("config", type=FILE)
+@click.option("--methods", default=None, help="Names separated by commas; all array methods unless given.")
+@out_option("polyins-out")
+@as_json_option
+@no_report_option
+def compare(config: Path, methods: str | None, out: Path, as_json: bool, no_report: bool) -> None:
+    """Run several methods over one recording, and each IMU on its own."""
+    _compare(config, methods, out, as_json, report=not no_report)
+
+
+def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report: bool) -> None:
+    from polyins import results
+    from polyins.compare import compare as run_all
+    from polyins.load import load
+    from polyins.methods import METHODS, find_method
+
+    names = [find_method(name.strip()).name for name in methods.split(",")] if methods else list(METHODS)
+    recording = load(config)
+    announce_compilation()
+    with progress("compare") as update:
+        result = run_all(recording, names, progress=update)
+    results.write_comparison(out, recording, result, report=report)
+    if as_json:
+        print(results.as_json(result.document))
+        return
+    title = f"{recording.name}; single: rms over {len(recording.imus)} IMUs; sqrt(N) = {result.document['sqrt_n']:.2f}"
+    print_summaries(title, result.document["methods"], result.document["ratio_to_single"])
+    say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
+
+
+@cli.command()
+@click.argument("solution", type=FILE)
+@click.option("--reference", type=FILE, required=True, help="A file with the true positions.")
+@as_json_option
+def evaluate(solution: Path, reference: Path, as_json: bool) -> None:
+    """Compare a written solution with a reference."""
+    from polyins import results
+    from polyins.evaluate.summary import summarize
+    from polyins.io.position_stream import load_reference
+    from polyins.io.solution_files import read_solution
+
+    estimate = read_solution(solution)
+    summary = summarize(estimate, load_reference(reference, estimate))
+    if as_json:
+        print(results.as_json(summary))
+    else:
+        print_summaries(str(solution), {estimate.method: summary}, {})
+
+
+@cli.command()
+@click.argument("scenario", type=FILE)
+@out_option("polyins-simulated")
+@click.option("--seed", type=int, default=None, help="Takes the place of the scenario's own.")
+def simulate(scenario: Path, out: Path, seed: int | None) -> None:
+    """Simulate the recording that a scenario file describes, with its truth and a configuration to run it."""
+    from polyins.simulate import files
+    from polyins.simulate.scenario import simulate as drive
+
+    say(f"configuration: {files.write(drive(scenario, seed=seed), out)}")
+
+
+@cli.command()
+@click.argument("target")
+@click.option("--quick", is_flag=True, help="Fewer runs.")
+@out_option("polyins-reproduced")
+@as_json_option
+def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
+    """Reproduce measured or published figures. TARGET: flights, array."""
+    from polyins import results
+    from polyins.reproduce import targets
+
+    function = targets.find_target(target)
+    announce_compilation()
+    with progress(target) as update:
+        document = function(quick, update)
+    results.write_document(out / f"{target}.json", document)
+    if as_json:
+        print(results.as_json(document))
+    else:
+        targets.print_document(document)
+
+
+@cli.command()
+@as_json_option
+def bench(as_json: bool) -> None:
+    """Time every method per epoch against the dense, paper-shaped single filter, in one run."""
+    from polyins import results
+    from polyins.bench import bench as measure
+
+    announce_compilation()
+    with progress("bench") as update:
+        document = measure(update)
+    if as_json:
+        print(results.as_json(document))
+        return
+    columns = ["name", "us/epoch, median", "min", "ratio to dense/single", "runs"]
+    rows = [
+        [r["name"], number(r["median"]), number(r["min"]), number(r["ratio_to_dense"], 3), str(r["runs"])]
+        for r in document["results"]
+    ]
+    print_table("CPU time per epoch, 200 Hz IMU and 1 Hz GNSS", columns, rows)
+
+
+@cli.group()
+def datasets() -> None:
+    """Public data sets by name."""
+
+
+@datasets.command("list")
+def list_datasets() -> None:
+    """List the data sets that polyins knows."""
+    from polyins import datasets as known
+
+    rows = [[name, str(known.info(name)["summary"]), str(known.info(name)["folder"] or "-")] for name in known.names()]
+    print_table("data sets", ["name", "what", "folder"], rows)
+
+
+@datasets.command("info")
+@click.argument("name")
+def dataset_info(name: str) -> None:
+    """Say what a data set is and where it is."""
+    from polyins import datasets as known
+
+    for key, value in known.info(name).items():
+        click.echo(f"{key}: {value}")
+
+
+@datasets.command("fetch")
+@click.argument("name")
+def fetch_dataset(name: str) -> None:
+    """Download a data set, unless it is here, and print its folder."""
+    from polyins import datasets as known
+
+    click.echo(known.fetch(name))
+
+
+@cli.command()
+@click.argument("file", type=FILE)
+@as_json_option
+def info(file: Path, as_json: bool) -> None:
+    """Say what is in a data file or configuration: streams, rates, gaps, span."""
+    from polyins import results
+    from polyins.io.inspect import inspect, listing
+
+    facts = inspect(file)
+    click.echo(results.as_json(facts) if as_json else listing(facts))
+
+
+@cli.command()
+@click.argument("source", metavar="IN", type=FILE)
+@click.argument("target", metavar="OUT", type=FILE)
+def convert(source: Path, target: Path) -> None:
+    """Convert a data file; the formats follow from content (IN) and suffix (OUT)."""
+    from polyins.io.convert import convert as convert_file
+
+    say(convert_file(source, target))
+
+
+@cli.command()
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("--out", type=FILE, default=None, help="File for the configuration; standard output unless given.")
+def init(files: tuple[Path, ...], out: Path | None) -> None:
+    """Look at recordings and write a commented configuration for them."""
+    from polyins.io.files import write_bytes
+    from polyins.io.propose import propose
+
+    text = propose(files)
+    if out is None:
+        click.echo(text)
+    elif out.exists():
+        raise InputError(f"--out {out}: exists; expected the name of a new file")
+    else:
+        write_bytes(out, text.encode())
+        say(f"configuration: {out}")

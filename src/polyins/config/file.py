@@ -1,0 +1,125 @@
+"""The whole file: filled in, validated, and what is wrong with it said in the user's words."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self, TypeVar
+
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails
+
+from polyins.config.fields import Positive, Section, number
+from polyins.config.imu import ImuEntry, ImuSettings
+from polyins.config.positions import GnssEntry, ReferenceEntry
+from polyins.config.timing import Outages, Start
+from polyins.errors import InputError
+from polyins.io.yaml_document import Document, Key
+
+SomeSection = TypeVar("SomeSection", bound=Section)
+
+
+class Filter(Section):
+    """What the filter is told beyond the sensors."""
+
+    gate_limit: Positive | None = 50.0
+    """a fix whose normalized innovation squared exceeds this is rejected; null: none is"""
+    gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = 5
+    """after that many rejections in a row the next fix is believed"""
+    gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0)] = 1e-4
+    """a fix nearer than this to an IMU epoch is applied at that epoch, s"""
+    gravity_m_s2: Positive = 9.80665
+    """on a local tangent plane only, m/s^2"""
+
+
+class Config(Section):
+    """The whole file."""
+
+    name: str = ""
+    """of the recording; without it the file's"""
+    dataset: str | None = None
+    """relative paths count from this data set's folder instead of the file's"""
+    imu_defaults: ImuSettings | None = None
+    """holds for each IMU that does not say otherwise"""
+    imus: Annotated[tuple[ImuEntry, ...], Field(min_length=1)]
+    """the IMUs of the array"""
+    gnss: GnssEntry | None = None
+    """the positions that aid the filter"""
+    reference: ReferenceEntry | None = None
+    """what the solution is judged by"""
+    start: Start = Start()
+    """how the navigation state is found at the start"""
+    outages: Outages = ()
+    """intervals in which GNSS is withheld: a schedule, or a list of [from, to] in s"""
+    filter: Filter = Filter()
+    """what the filter is told beyond the sensors"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_imus(cls, values: Any) -> Any:
+        """Complete each IMU by the defaults and by a name."""
+        if not isinstance(values, dict) or not isinstance(values.get("imus"), list):
+            return values
+        defaults = values.get("imu_defaults")
+        imus = [
+            {"name": f"imu{number}", **_merged(defaults, imu)} if isinstance(imu, dict) else imu
+            for number, imu in enumerate(values["imus"], 1)
+        ]
+        return {**values, "imus": imus}
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        names = [imu.name for imu in self.imus]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise ValueError(f"imus: two are named {name!r}; expected a name of its own for each")
+        return self
+
+
+def parse(document: Document) -> Config:
+    """Validate what a configuration says; raises InputError as `validated` does."""
+    return validated(Config, document)
+
+
+def validated(model: type[SomeSection], document: Document) -> SomeSection:
+    """Validate what a YAML file says as a section of the given kind.
+
+    Raises InputError that names file, line and key of the first thing wrong.
+    """
+    if document.duplicate:
+        raise InputError(f"{document.duplicate}; expected each key once")
+    try:
+        return model.model_validate(document.values)
+    except ValidationError as error:
+        raise InputError(_explain(error.errors()[0], document)) from error
+
+
+def _merged(defaults: object, given: dict[str, Any]) -> dict[str, Any]:
+    """Lay `given` over `defaults`, mappings key by key."""
+    if not isinstance(defaults, dict):
+        return given
+    both = {**defaults, **given}
+    for key, value in given.items():
+        if isinstance(value, dict):
+            both[key] = _merged(defaults.get(key), value)
+    return both
+
+
+def _explain(error: ErrorDetails, document: Document) -> str:
+    """Say in the user's words where validation failed and what was expected."""
+    context = error.get("ctx", {})
+    keys: list[Key] = [key for key in error["loc"] if key not in ("schedule", "list", "str", "int")]
+    if "key" in context:
+        keys.append(context["key"])
+    place = document.place(keys)
+    kind = error["type"]
+    if kind == "missing":
+        return f"{place}: is missing; expected it in this mapping"
+    if kind == "literal_error":
+        return f"{place}: is {error['input']!r}; expected {context['expected']}"
+    if kind == "too_short":
+        return f"{place}: is empty; expected at least one"
+    if kind in ("tuple_type", "model_type", "dict_type"):
+        return f"{place}: is {error['input']!r}; expected a {'list' if kind == 'tuple_type' else 'mapping'}"
+    message = error["msg"].removeprefix("Value error, ")
+    if kind in ("unknown_key", "axes") or not message.startswith(("expected", "Input should be")):
+        return f"{place}: {message[0].lower()}{message[1:]}"
+    return f"{place}: is {error['input']!r}; {message.replace('Input should be', 'expected')}"

@@ -1,0 +1,159 @@
+"""The IMUs: files, mounts, noise, errors known beforehand."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from polyins.config.columns import ImuColumns
+from polyins.config.fields import ORIGIN, Number, PerAxis, Positive, Section, Spread, Triple
+
+NOISE_GRADES: dict[str, dict[str, float]] = {
+    "consumer-mems": {
+        "angle_random_walk_deg_sqrt_h": 0.24,
+        "velocity_random_walk_m_s_sqrt_h": 0.24,
+        "gyro_bias_deg_h": 50.0,
+        "accel_bias_mgal": 250.0,
+        "gyro_scale_ppm": 1000.0,
+        "accel_scale_ppm": 1000.0,
+        "correlation_time_h": 1.0,
+    },
+    "industrial-mems": {
+        "angle_random_walk_deg_sqrt_h": 0.15,
+        "velocity_random_walk_m_s_sqrt_h": 0.08,
+        "gyro_bias_deg_h": 10.0,
+        "accel_bias_mgal": 100.0,
+        "gyro_scale_ppm": 500.0,
+        "accel_scale_ppm": 500.0,
+        "correlation_time_h": 1.0,
+    },
+    "tactical": {
+        "angle_random_walk_deg_sqrt_h": 0.03,
+        "velocity_random_walk_m_s_sqrt_h": 0.03,
+        "gyro_bias_deg_h": 1.0,
+        "accel_bias_mgal": 50.0,
+        "gyro_scale_ppm": 200.0,
+        "accel_scale_ppm": 200.0,
+        "correlation_time_h": 4.0,
+    },
+}
+"""Typical figures by class of sensor. The first is an ICM-20602 as in the enav-fusion paper's public settings."""
+
+
+def _axis_names(value: object) -> object:
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise ValueError("expected three of x, y, z with or without a minus, like [x, -y, -z]")
+    return tuple(str(item) for item in value)
+
+
+class Noise(Section):
+    """How good an IMU is: random walks, and the std and correlation time of its slow errors (Gauss-Markov)."""
+
+    grade: Literal["consumer-mems", "industrial-mems", "tactical"] | None = None
+    """fills in what is not given below; without it consumer-mems does"""
+    angle_random_walk_deg_sqrt_h: Spread
+    """deg/sqrt(h)"""
+    velocity_random_walk_m_s_sqrt_h: Spread
+    """m/s/sqrt(h)"""
+    gyro_bias_deg_h: Spread
+    """std of the gyro bias, deg/h"""
+    accel_bias_mgal: Spread
+    """std of the accelerometer bias, mGal (1e-5 m/s^2)"""
+    gyro_scale_ppm: Spread
+    """std of the gyro scale factor, ppm"""
+    accel_scale_ppm: Spread
+    """std of the accelerometer scale factor, ppm"""
+    correlation_time_h: Positive
+    """of all four, h"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_from_grade(cls, values: Any) -> Any:
+        given = {"grade": values} if isinstance(values, str) else values
+        if not isinstance(given, dict):
+            raise ValueError(f"expected a mapping or the name of a grade: {', '.join(NOISE_GRADES)}")
+        grade = given.get("grade")
+        if grade is not None and grade not in NOISE_GRADES:
+            raise ValueError(f"unknown grade {grade!r}; expected one of {', '.join(NOISE_GRADES)}")
+        said = {key: value for key, value in given.items() if value is not None}
+        return {"grade": None, **NOISE_GRADES[grade or "consumer-mems"], **said}
+
+
+class InitialErrors(Section):
+    """The slow errors known beforehand, in array axes."""
+
+    gyro_bias_deg_s: PerAxis = ORIGIN
+    """deg/s"""
+    accel_bias_m_s2: PerAxis = ORIGIN
+    """m/s^2"""
+    gyro_scale_ppm: PerAxis = ORIGIN
+    """ppm"""
+    accel_scale_ppm: PerAxis = ORIGIN
+    """ppm"""
+
+
+class InitialStd(Section):
+    """How sure the initial errors are, 1 sigma; what is not given is as in `noise`."""
+
+    gyro_bias_deg_s: Spread | None = None
+    """deg/s"""
+    accel_bias_m_s2: Spread | None = None
+    """m/s^2"""
+    gyro_scale_ppm: Spread | None = None
+    """ppm"""
+    accel_scale_ppm: Spread | None = None
+    """ppm"""
+
+
+class ImuSettings(Section):
+    """What can be said of one IMU, or under `imu_defaults` of all."""
+
+    format: Literal["auto", "xsens-dot", "kf-gins", "table"] = "auto"
+    """of the file; auto: found from its content"""
+    columns: ImuColumns | None = None
+    """of a table; without it the table has the columns that polyins writes"""
+    rate_hz: Positive | None = None
+    """take row number / rate_hz as the time and ignore the stamps"""
+    clock_offset_s: Number = 0.0
+    """added to the stamps, s"""
+    axes: Annotated[tuple[str, str, str], BeforeValidator(_axis_names)] = ("x", "y", "z")
+    """which sensor axes point forward, right and down in the array"""
+    mount_deg: Triple = ORIGIN
+    """roll, pitch, yaw of the sensor in the array, deg, after `axes`: C_ab = Rz(yaw) Ry(pitch) Rx(roll)"""
+    position_m: Triple = ORIGIN
+    """from the array's origin: forward, right, down, m"""
+    noise: Noise = Field(default_factory=lambda: Noise.model_validate("consumer-mems"))
+    """how good the sensor is: a mapping, or just the name of a grade"""
+    initial_errors: InitialErrors = InitialErrors()
+    """slow errors known beforehand"""
+    initial_std: InitialStd = InitialStd()
+    """how sure they are"""
+
+    @model_validator(mode="after")
+    def _axes_are_right_handed(self) -> Self:
+        if sorted(name.lstrip("-") for name in self.axes) != ["x", "y", "z"] or any(len(a) > 2 for a in self.axes):
+            problem = f"axes {list(self.axes)} are not a permutation of x, y, z"
+        elif not _right_handed(self.axes):
+            problem = f"axes {list(self.axes)} are left-handed"
+        else:
+            return self
+        raise PydanticCustomError(
+            "axes", "{problem}; expected right-handed ones, like [x, -y, -z]", {"key": "axes", "problem": problem}
+        )
+
+
+class ImuEntry(ImuSettings):
+    """One IMU."""
+
+    name: str = ""
+    """a name of its own; imu1, imu2, ... if not given"""
+    file: str
+    """where its data are"""
+
+
+def _right_handed(axes: tuple[str, str, str]) -> bool:
+    order = [name.lstrip("-") for name in axes]
+    cyclic = order in (["x", "y", "z"], ["y", "z", "x"], ["z", "x", "y"])
+    return cyclic == (sum(name.startswith("-") for name in axes) % 2 == 0)

@@ -1,0 +1,52 @@
+"""GNSS and reference."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from polyins.config.columns import TrackColumns
+from polyins.config.fields import ORIGIN, Number, Positive, Section, Spread, Triple
+
+
+class GnssEntry(Section):
+    """The positions that aid the filter."""
+
+    file: str
+    """where the data are"""
+    format: Literal["auto", "kf-gins", "rtklib-pos", "table"] = "auto"
+    """of the file; auto: found from its content"""
+    columns: TrackColumns | None = None
+    """of a table; without it the table has the columns that polyins writes"""
+    clock_offset_s: Number = 0.0
+    """added to the stamps, s"""
+    antenna_position_m: Triple = ORIGIN
+    """of the antenna from the array's origin: forward, right, down, m"""
+    position_std_m: Spread | None = None
+    """north, east, down, m; takes the place of what the file says"""
+    rate_hz: Positive | None = None
+    """thin the fixes to this rate"""
+    height: Literal["ellipsoidal", "sea-level"] = "ellipsoidal"
+    """what heights count from"""
+    geoid_height_m: Number | None = None
+    """height of the geoid above the ellipsoid, m; needed with sea-level heights"""
+
+
+class ReferenceEntry(Section):
+    """What the solution is judged by."""
+
+    file: str
+    """where the data are"""
+    format: Literal["auto", "kf-gins-nav", "kf-gins", "rtklib-pos", "table"] = "auto"
+    """of the file; auto: found from its content"""
+    columns: TrackColumns | None = None
+    """of a table; without it the table has the columns that polyins writes"""
+    clock_offset_s: Number = 0.0
+    """added to the stamps, s"""
+    position_lag_s: Number = 0.0
+    """position and velocity belong to an instant that much later than the attitude of the same row, s"""
+    point_m: Triple = ORIGIN
+    """the point that the positions describe, from the array's origin: forward, right, down, m"""
+    height: Literal["ellipsoidal", "sea-level"] = "ellipsoidal"
+    """what heights count from"""
+    geoid_height_m: Number | None = None
+    """height of the geoid above the ellipsoid, m; needed with sea-level heights"""

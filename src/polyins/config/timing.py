@@ -1,0 +1,91 @@
+"""Start and outages."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from polyins.config.fields import Number, Pair, Positive, Section, Spread, Triple, number
+
+
+class StartPosition(Section):
+    """Where the array's origin is: geodetic, or on the local tangent plane."""
+
+    latitude_deg: Annotated[float, BeforeValidator(number), Field(ge=-90.0, le=90.0)] | None = None
+    """deg"""
+    longitude_deg: Annotated[float, BeforeValidator(number), Field(ge=-360.0, le=360.0)] | None = None
+    """deg"""
+    north_m: Number | None = None
+    """m"""
+    east_m: Number | None = None
+    """m"""
+    height_m: Number = 0.0
+    """m above the ellipsoid, or above the local plane's zero"""
+
+    @property
+    def geodetic(self) -> bool:
+        """Whether latitude and longitude are given."""
+        return self.latitude_deg is not None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = [self.latitude_deg, self.longitude_deg, self.north_m, self.east_m]
+        if [value is not None for value in given] not in ([True, True, False, False], [False, False, True, True]):
+            raise ValueError("expected latitude_deg and longitude_deg, or north_m and east_m")
+        return self
+
+
+class Start(Section):
+    """How the navigation state is found at the start; what is not given is found from the data."""
+
+    time_s: Number | None = None
+    """s, on the clock of the recording; without it the first instant at which all that is needed is there"""
+    end_time_s: Number | None = None
+    """s; without it the end of the data"""
+    position: StartPosition | None = None
+    """of the array's origin"""
+    velocity_m_s: Triple | None = None
+    """north, east, down, m/s"""
+    roll_pitch_deg: Pair | None = None
+    """deg"""
+    heading_deg: Number | None = None
+    """deg, clockwise from north"""
+    heading_from: Literal["auto", "value", "gnss-course", "reference"] = "auto"
+    """auto: the first of the others that the data allow"""
+    static_interval_s: Pair | None = None
+    """the array stands still from, to, s; without it looked for"""
+    position_std_m: Spread | None = None
+    """north, east, down, m"""
+    velocity_std_m_s: Spread | None = None
+    """north, east, down, m/s"""
+    attitude_std_deg: Spread | None = None
+    """roll, pitch, heading, deg"""
+    estimate_gyro_bias: bool = True
+    """take the mean of the gyros over a static interval as their bias"""
+
+
+class OutageSchedule(Section):
+    """GNSS is withheld again and again."""
+
+    length_s: Positive
+    """how long each outage lasts, s"""
+    every_s: Positive
+    """from the beginning of one outage to that of the next, s"""
+    first_after_s: Number | None = None
+    """from start.time_s, else the first usable fix, to the first outage, s; every_s - length_s unless given"""
+
+    @model_validator(mode="after")
+    def _outages_end(self) -> Self:
+        if self.every_s <= self.length_s:
+            raise ValueError(f"every_s is {self.every_s:g}; expected more than length_s, {self.length_s:g}")
+        return self
+
+
+def _outage_kind(value: object) -> str:
+    return "schedule" if isinstance(value, dict | OutageSchedule) else "list"
+
+
+Outages = Annotated[
+    Annotated[OutageSchedule, Tag("schedule")] | Annotated[tuple[Pair, ...], Tag("list")], Discriminator(_outage_kind)
+]

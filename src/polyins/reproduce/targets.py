@@ -1,0 +1,44 @@
+"""What can be reproduced, by name."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from polyins.errors import InputError
+from polyins.screen import number, print_table
+
+Document = dict[str, Any]
+
+TARGETS = ("flights", "array", "consistency")
+"""Each is a module of this package with a function `reproduce(quick, progress)`."""
+
+
+def find_target(name: str) -> Callable[[bool, Callable[[float], None]], Document]:
+    """Return the function of a target; raise InputError with the nearest known one otherwise."""
+    if name not in TARGETS:
+        near = difflib.get_close_matches(name, TARGETS, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(TARGETS)}"
+        raise InputError(f"reproduce: target {name!r} is unknown; {hint}")
+    function: Callable[[bool, Callable[[float], None]], Document] = importlib.import_module(
+        f"polyins.reproduce.{name}"
+    ).reproduce
+    return function
+
+
+def print_document(document: Document) -> None:
+    """Print every figure of a document, one per row, named by its path."""
+    rows = [[path, value] for path, value in _leaves(document["polyins"])]
+    print_table(document["target"], ["figure", "polyins"], rows)
+
+
+def _leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(item, f"{path} / {key}" if path else str(key))
+    elif isinstance(value, list):
+        yield path, ", ".join(number(item) for item in value)
+    else:
+        yield path, str(value) if isinstance(value, int) else number(value if isinstance(value, float) else None, 3)

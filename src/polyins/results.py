@@ -1,0 +1,61 @@
+"""The files that a command leaves in its folder; each is whole or absent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from polyins.compare import Comparison
+from polyins.io.files import write_bytes
+from polyins.io.solution_files import write_solution
+from polyins.recording import Recording
+from polyins.solution import Solution
+
+Document = Mapping[str, Any]
+
+
+def as_json(document: Document) -> str:
+    """Return a document as JSON; NaN is an error."""
+    return json.dumps(document, indent=2, allow_nan=False)
+
+
+def write_document(path: Path, document: Document) -> None:
+    """Write a document as a JSON file."""
+    write_bytes(path, (as_json(document) + "\n").encode())
+
+
+def write_run(folder: Path, recording: Recording, solution: Solution, summary: Document, report: bool = True) -> None:
+    """Write solution, summary, configuration and report of one run."""
+    write_solution(solution, folder)
+    write_document(folder / "summary.json", summary)
+    _write_config(folder, recording)
+    if report:
+        from polyins.report.page import write_report
+
+        write_report(folder / "report.html", {solution.method: (solution, dict(summary))}, recording)
+
+
+def write_comparison(folder: Path, recording: Recording, result: Comparison, report: bool = True) -> None:
+    """Write a folder per method, one per IMU below `single`, and what compares them."""
+    summaries = result.document["methods"]
+    for name, solution in result.solutions.items():
+        if name != "single":
+            write_solution(solution, folder / name)
+            write_document(folder / name / "summary.json", summaries[name])
+    if "single" in result.solutions:
+        for (name, solution), summary in zip(result.each.items(), summaries["single"]["each"], strict=True):
+            write_solution(solution, folder / "single" / name)
+            write_document(folder / "single" / name / "summary.json", summary)
+    write_document(folder / "summary.json", result.document)
+    _write_config(folder, recording)
+    if report:
+        from polyins.report.page import write_report
+
+        runs = {name: (solution, summaries[name]) for name, solution in result.solutions.items()}
+        write_report(folder / "report.html", runs, recording, result.document)
+
+
+def _write_config(folder: Path, recording: Recording) -> None:
+    write_bytes(folder / "config.yaml", recording.config_text.encode())

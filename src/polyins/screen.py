@@ -1,0 +1,96 @@
+"""What a person sees while waiting and at the end: progress and tables, on standard error and output."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+SOON = 1.0
+"""s after which a progress bar appears"""
+
+
+def say(text: str) -> None:
+    """Print a message on standard error."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def announce_compilation() -> None:
+    """Say that the kernels will be compiled, if they have not been since installing."""
+    from polyins.kernels.jit import CACHE_FOLDER
+
+    if not any(CACHE_FOLDER.glob("**/*.nbc")):
+        say("polyins: the first run compiles its kernels, which takes about 20 s; later runs load them")
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Callable[[float], None]]:
+    """Give a function that takes the share done; a bar appears when the work takes longer than a second."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn(label), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
+    bar = Progress(*columns, console=console, transient=True)
+    task = bar.add_task(label, total=1.0)
+    begin = time.monotonic()
+
+    def update(share: float) -> None:
+        bar.update(task, completed=share)
+        if not bar.live.is_started and time.monotonic() - begin > SOON and console.is_terminal:
+            bar.start()
+
+    try:
+        yield update
+    finally:
+        bar.stop()
+
+
+def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
+    """Print a table on standard output, the first column left and the others right aligned."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="right" if number else "left")
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """Return a figure for a table, a dash where there is none."""
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+FIGURES = (
+    ("outages rms of max, m", ("outages", "horizontal_max_rms_m"), 2),
+    ("horizontal rms, m", ("reference", "horizontal_rms_m"), 2),
+    ("vertical rms, m", ("reference", "vertical_rms_m"), 2),
+    ("roll, deg", ("reference", "roll_rmse_deg"), 3),
+    ("pitch, deg", ("reference", "pitch_rmse_deg"), 3),
+    ("heading, deg", ("reference", "heading_rmse_deg"), 3),
+    ("us/epoch", ("us_per_epoch",), 2),
+)
+
+
+def print_summaries(title: str, summaries: Mapping[str, Mapping[str, Any]], ratios: Mapping[str, float | None]) -> None:
+    """Print the figures of one or more methods as a table, then their warnings."""
+    rows = []
+    for name, summary in summaries.items():
+        row = [name]
+        for _, keys, digits in FIGURES:
+            value: Any = summary
+            for key in keys:
+                value = value[key]
+            row.append(number(value, digits))
+        if ratios:
+            row.append("1" if name == "single" else number(ratios.get(name), 2))
+        rows.append(row)
+    columns = ["method", *(label for label, _, _ in FIGURES)] + (["ratio to single"] if ratios else [])
+    print_table(title, columns, rows)
+    for text in dict.fromkeys(text for summary in summaries.values() for text in summary["warnings"]):
+        say(f"warning: {text}")

@@ -1,0 +1,1 @@
+"""Recordings whose truth is known: a drive, an array of IMUs with errors, a GNSS receiver."""

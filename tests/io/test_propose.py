@@ -1,0 +1,93 @@
+"""Configurations proposed for recordings that nobody has described."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from written_recordings import as_increments, fixes, still_imu, write_recording, write_rows
+
+from polyins.errors import InputError
+from polyins.io.propose import propose
+from polyins.load import load
+
+
+def save(folder: Path, text: str) -> Path:
+    path = folder / "proposed.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_a_proposal_loads_right_away(tmp_path: Path) -> None:
+    write_recording(tmp_path)
+    text = propose([tmp_path / name for name in ("gnss.txt", "a.txt", "b.csv")])
+    recording = load(save(tmp_path, text))
+    assert [imu.name for imu in recording.rig.imus] == ["imu1", "imu2"]
+    assert recording.gnss is not None
+    np.testing.assert_allclose(recording.imus[0].dvel, recording.imus[1].dvel, atol=2e-9)
+    assert text.count("# CHECK: forward, right, down from the array's origin") == 3
+
+
+@pytest.mark.parametrize("order", [[1, 2, 3], [2, -1, 3], [3, 1, 2], [-3, 2, 1], [1, -2, -3]])
+def test_gravity_tells_what_is_down(order: list[int], tmp_path: Path) -> None:
+    rows = as_increments(still_imu())
+    turned = rows.copy()
+    for group in (1, 4):
+        for axis, source in enumerate(order):
+            turned[:, group + axis] = np.sign(source) * rows[:, group + abs(source) - 1]
+    text = propose([write_rows(tmp_path / "imu.txt", turned)])
+    mean = load(save(tmp_path, text)).imus[0].dvel.mean(axis=0)
+    assert mean[2] == pytest.approx(-9.80665 / 50)
+
+
+def test_repeated_stamps_are_counted_instead(tmp_path: Path) -> None:
+    rows = as_increments(still_imu())
+    rows[7, 0] = rows[6, 0]
+    text = propose([write_rows(tmp_path / "imu.txt", rows)])
+    assert "rate_hz: 50  # CHECK: 1 stamp(s) repeat" in text
+    assert load(save(tmp_path, text)).imus[0].rate_hz == pytest.approx(50.0)
+
+
+def test_clocks_that_differ_are_marked(tmp_path: Path) -> None:
+    imu = write_rows(tmp_path / "imu.txt", as_increments(still_imu()))
+    later = fixes()
+    later[:, 0] += 1000.0
+    gnss = write_rows(tmp_path / "gnss.txt", later)
+    text = propose([imu, gnss])
+    assert "clock_offset_s: 0.0  # CHECK: the IMUs' stamps run from 100.000 to 109.980 s" in text
+    recording = load(save(tmp_path, text.replace("clock_offset_s: 0.0", "clock_offset_s: -1000.0")))
+    assert recording.gnss is not None
+    assert recording.gnss.time[0] == pytest.approx(100.5)
+
+
+def test_a_solution_is_a_reference(tmp_path: Path) -> None:
+    imu = write_rows(tmp_path / "imu.txt", as_increments(still_imu()))
+    rows = fixes()
+    nav = np.column_stack([0 * rows[:, 0], rows[:, :4], np.zeros((len(rows), 6))])
+    recording = load(save(tmp_path, propose([imu, write_rows(tmp_path / "truth.nav", nav)])))
+    assert recording.gnss is None
+    assert recording.reference is not None
+    assert recording.reference.attitude is not None
+
+
+def test_positions_without_std_get_a_marked_one(tmp_path: Path) -> None:
+    imu = write_rows(tmp_path / "imu.txt", as_increments(still_imu()))
+    gnss = write_rows(tmp_path / "g.csv", fixes()[:, :4], "time,latitude,longitude,height", ",")
+    text = propose([imu, gnss])
+    assert "position_std_m: [1.5, 1.5, 3.0]  # CHECK" in text
+    assert load(save(tmp_path, text)).geodetic
+
+
+def test_no_imu_data(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"gnss\.txt: no IMU data; expected at least one file"):
+        propose([write_rows(tmp_path / "gnss.txt", fixes())])
+
+
+def test_a_real_flight_loads_right_away(data_folder: Path, tmp_path: Path) -> None:
+    folder = data_folder / "quadrotor" / "Horizontal" / "path_9"
+    text = propose([folder / name for name in ("IMU_1.csv", "IMU_2.csv", "IMU_3.csv", "IMU_4.csv", "GT.csv")])
+    recording = load(save(tmp_path, text))
+    assert len(recording.imus) == 4
+    assert recording.gnss is not None
+    assert text.count("axes: [x, -y, -z]") == 4
