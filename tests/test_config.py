@@ -15,6 +15,7 @@ from polyins import config
 from polyins.config import NOISE_GRADES, Config, ImuEntry, Noise, OutageSchedule, parse
 from polyins.errors import InputError
 from polyins.io.yaml_document import Document, read_yaml, write_yaml
+from polyins.recording import FilterOptions
 
 
 def parsed(values: dict[str, Any]) -> Config:
@@ -36,7 +37,7 @@ def test_every_key_is_described(section: type[BaseModel]) -> None:
 def test_only_the_file_of_an_imu_must_be_given() -> None:
     filled = parsed({"imus": [{"file": "a.csv"}, {"file": "b.csv"}]})
     assert [imu.name for imu in filled.imus] == ["imu1", "imu2"]
-    assert filled.filter.gate_limit == 50.0
+    assert filled.filter.gate_limit == FilterOptions().gate_limit
     assert filled.gnss is None
     assert filled.outages == ()
 

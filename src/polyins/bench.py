@@ -14,7 +14,7 @@ from polyins import batch
 from polyins.recording import Recording
 
 ROUNDS = 9
-SECONDS = 60.0
+SECONDS = 120.0
 
 CASES = (
     ("dense/single", "single", 1, True),

@@ -92,35 +92,46 @@ class Outputs(NamedTuple):
 
 
 @kernel
-def propagate(state: State, plan: Plan, fraction: float, dt: float, work: tuple[Array, Array] | None) -> None:
-    """Advance every IMU, every covariance block and the fused states by dt, a fraction of the measured interval."""
-    blocks, groups, members = state.blocks, state.groups, state.members
-    if state.near[0] != 0.0 and abs(groups[-1, share.POSITION] - state.near[1]) > 5e-4:
-        move_near(state.near, groups[-1, share.POSITION])
-    previous_dt = state.clock[1]
-    ratio = dt * dt / (6.0 * previous_dt * (previous_dt + dt))
+def propagate(
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    near: Array,
+    clock: Array,
+    shared_mechanization: bool,
+    fraction: float,
+    dt: float,
+    work: tuple[Array, Array] | None,
+) -> None:
+    """Advance every IMU, every covariance block and the fused states by dt, a fraction of the measured interval.
+
+    Takes the arrays of a `State` one by one: passing the whole costs more than some of the steps.
+    """
+    if near[0] != 0.0 and abs(groups[-1, share.POSITION] - near[1]) > 5e-4:
+        move_near(near, groups[-1, share.POSITION])
+    ratio = dt * dt / (6.0 * clock[1] * (clock[1] + dt))
     for b in range(blocks.shape[0]):
         w = blocks[b]
         strapdown.compensate(w, fraction, dt)
-        if plan.shared_mechanization:
+        if shared_mechanization:
             fuse.evaluate_at_fused_state(w, groups[0])
         else:
             strapdown.evaluate_at_own_state(w)
     for s in range(members.shape[0]):
         g = groups[s]
         fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
-        share.error_model(g, dt, state.near)
+        share.error_model(g, dt, near)
         if work is None:
             share.predict(g, dt)
         else:
             dense.predict(g, dt, work[0], work[1])
     for b in range(blocks.shape[0]):
         w = blocks[b]
-        strapdown.mechanize(w, dt, ratio, state.near)
+        strapdown.mechanize(w, dt, ratio, near)
         strapdown.remember(w)
-    state.clock[0] += dt
-    state.clock[1] = dt
-    merge(state)
+    clock[0] += dt
+    clock[1] = dt
+    merge(blocks, groups, members, dt)
 
 
 @kernel
@@ -132,13 +143,12 @@ def move_near(near: Array, latitude: float) -> None:
 
 
 @kernel
-def merge(state: State) -> None:
+def merge(blocks: Array, groups: Array, members: Array, dt: float) -> None:
     """Fuse the members of each share, and all IMUs into the last row of the groups."""
-    blocks, groups, members = state.blocks, state.groups, state.members
     shares = members.shape[0]
     if members[shares - 1, 1] > 1:
         for b in range(blocks.shape[0]):
-            fuse.project_to_origin(blocks[b], state.clock[1])
+            fuse.project_to_origin(blocks[b], dt)
     for s in range(shares):
         fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
     if shares > 1:
@@ -236,7 +246,7 @@ def _correct(state: State) -> None:
         w = state.blocks[b]
         strapdown.update_matrix(w)
         strapdown.update_sensitivity(w)
-    merge(state)
+    merge(state.blocks, state.groups, state.members, state.clock[1])
 
 
 @kernel
@@ -252,13 +262,10 @@ def aid(state: State, plan: Plan, inputs: Inputs, outputs: Outputs) -> None:
 
 
 @kernel
-def load(state: State, plan: Plan, raw: Array, interval: float) -> None:
+def load(blocks: Array, raw: Array) -> None:
     """Put the measured increments of one epoch, (6, N), into the lanes."""
-    if plan.virtual:
-        fuse.average_increments(raw, interval, plan.to_origin, state.before, state.blocks)
-        return
-    for b in range(state.blocks.shape[0]):
-        w = state.blocks[b]
+    for b in range(blocks.shape[0]):
+        w = blocks[b]
         for k in range(6):
             for i in range(min(LANES, raw.shape[1] - b * LANES)):
                 w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
@@ -270,7 +277,10 @@ def begin(state: State, plan: Plan, raw: Array, interval: float) -> None:
 
     The increments that end at the start are the previous ones of the first epoch.
     """
-    load(state, plan, raw, interval)
+    if plan.virtual:
+        fuse.average_increments(raw, interval, plan.to_origin, state.before, state.blocks)
+    else:
+        load(state.blocks, raw)
     for b in range(state.blocks.shape[0]):
         w = state.blocks[b]
         strapdown.update_matrix(w)
@@ -284,42 +294,19 @@ def begin(state: State, plan: Plan, raw: Array, interval: float) -> None:
         strapdown.remember(w)
     for s in range(state.members.shape[0]):
         fuse.fuse_measurements(state.blocks, state.members[s, 0], state.members[s, 1], state.groups[s], interval)
-    merge(state)
+    merge(state.blocks, state.groups, state.members, state.clock[1])
 
 
 @kernel
-def step(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, k: int, work: tuple[Array, Array] | None) -> None:
-    """Take epoch k: a fix inside the interval splits it."""
-    begin, end = inputs.time[k - 1], inputs.time[k]
-    interval = end - begin
-    load(state, plan, inputs.increments[k], interval)
-    now = begin
-    fixes = inputs.fix_time.shape[0]
-    while state.counters[0] < fixes and inputs.fix_time[state.counters[0]] < end - plan.gnss_snap:
-        t = inputs.fix_time[state.counters[0]]
-        if t > now + plan.gnss_snap:
-            propagate(state, plan, (t - now) / interval, t - now, work)
-            now = t
-        aid(state, plan, inputs, outputs)
-    propagate(state, plan, (end - now) / interval, end - now, work)
-    while state.counters[0] < fixes and inputs.fix_time[state.counters[0]] <= end + plan.gnss_snap:
-        aid(state, plan, inputs, outputs)
-
-
-@kernel
-def write(state: State, plan: Plan, outputs: Outputs, k: int, time: float) -> None:
-    """Write the merged state and its variances; the variance of several shares is their mean."""
-    g = state.groups[-1]
+def write(groups: Array, members: Array, states: Array, variances: Array, k: int) -> None:
+    """Write row k: the merged state and its variances; the variance of several shares is their mean."""
     for i in range(10):
-        outputs.states[k, i] = g[share.POSITION + i]
-    shares = state.members.shape[0]
-    variance = outputs.variances[k]
+        states[k, i] = groups[-1, share.POSITION + i]
+    variance = variances[k]
     for i in range(12):
         variance[i] = 0.0
-    for s in range(shares):
-        _add_variances(state.groups[s], 1.0 / shares, variance)
-    if (k - 1) % plan.log_every == 0:
-        _log(state, outputs, time)
+    for s in range(members.shape[0]):
+        _add_variances(groups[s], 1.0 / members.shape[0], variance)
 
 
 @kernel
@@ -356,7 +343,33 @@ def run_epochs(
     last: int,
     work: tuple[Array, Array] | None,
 ) -> None:
-    """Take epochs first ... last - 1; the first of a recording is 1, since epoch 0 is the start."""
+    """Take epochs first ... last - 1; the first of a recording is 1, since epoch 0 is the start.
+
+    A fix inside an interval splits it.
+    """
+    blocks, groups, members, near, clock = state.blocks, state.groups, state.members, state.near, state.clock
+    time, increments, fix_time, counters = inputs.time, inputs.increments, inputs.fix_time, state.counters
+    states, variances = outputs.states, outputs.variances
+    virtual, shared, snap = plan.virtual, plan.shared_mechanization, plan.gnss_snap
+    next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
     for k in range(first, last):
-        step(state, plan, inputs, outputs, k, work)
-        write(state, plan, outputs, k, inputs.time[k])
+        now, end = time[k - 1], time[k]
+        interval = end - now
+        if virtual:
+            fuse.average_increments(increments[k], interval, plan.to_origin, state.before, blocks)
+        else:
+            load(blocks, increments[k])
+        while next_fix < end - snap:
+            if next_fix > now + snap:
+                dt = next_fix - now
+                propagate(blocks, groups, members, near, clock, shared, dt / interval, dt, work)
+                now = next_fix
+            aid(state, plan, inputs, outputs)
+            next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
+        propagate(blocks, groups, members, near, clock, shared, (end - now) / interval, end - now, work)
+        while next_fix <= end + snap:
+            aid(state, plan, inputs, outputs)
+            next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
+        write(groups, members, states, variances, k)
+        if (k - 1) % plan.log_every == 0:
+            _log(state, outputs, end)

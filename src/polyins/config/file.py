@@ -13,6 +13,7 @@ from polyins.config.positions import GnssEntry, ReferenceEntry
 from polyins.config.timing import Outages, Start
 from polyins.errors import InputError
 from polyins.io.yaml_document import Document, Key
+from polyins.recording import FilterOptions
 
 SomeSection = TypeVar("SomeSection", bound=Section)
 
@@ -20,13 +21,13 @@ SomeSection = TypeVar("SomeSection", bound=Section)
 class Filter(Section):
     """What the filter is told beyond the sensors."""
 
-    gate_limit: Positive | None = 50.0
+    gate_limit: Positive | None = FilterOptions.gate_limit
     """a fix whose normalized innovation squared exceeds this is rejected; null: none is"""
-    gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = 5
+    gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = FilterOptions.gate_reopen_after
     """after that many rejections in a row the next fix is believed"""
-    gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0)] = 1e-4
+    gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0)] = FilterOptions.gnss_snap
     """a fix nearer than this to an IMU epoch is applied at that epoch, s"""
-    gravity_m_s2: Positive = 9.80665
+    gravity_m_s2: Positive = FilterOptions.gravity
     """on a local tangent plane only, m/s^2"""
 
 

@@ -42,6 +42,7 @@ GYRO_PSD = _take(3)  # angle random walk squared, rad^2/s
 ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
 ERROR_PSD = _take(12)  # 2 sigma^2 / tau of each Gauss-Markov process
 DECAY = _take(12)  # 1 / tau
+FACTOR = _take(12)  # 1 - dt / tau
 # error model times dt: rows velocity and phi of F, 3 x 3 each
 F_RR = _take(9)
 F_VR = _take(9)
@@ -277,25 +278,34 @@ def _add_half_noise(g: Array, dt: float) -> None:
 
 
 @kernel
-def predict(g: Array, dt: float) -> None:
-    """Advance P by dt, paper A (5), with Phi = I + F dt and trapezoidal noise.
-
-    Phi P Phi' + (Phi Q Phi' + Q) / 2 = Phi (P + Q / 2) Phi' + Q / 2; only the blocks of Phi that are neither zero
-    nor one are multiplied, and the lower triangle of the navigation block mirrors the upper one.
-    """
-    _add_half_noise(g, dt)
-    _navigation_rows_of_phi_p(g, dt)
-    _navigation_rows_of_phi_u(g, dt)
+def _take_over(g: Array, dt: float) -> None:
+    """Put the products in their places in P; the IMU errors decay, and the lower triangle mirrors the upper one."""
+    for k in range(12):
+        g[FACTOR + k] = 1.0 - dt * g[DECAY + k]
+    for i in range(NAV):
+        for k in range(12):
+            g[P + i * STRIDE + NAV + k] = g[FACTOR + k] * g[T + i * STRIDE + NAV + k]
+    for k in range(12):
+        decay = g[FACTOR + k]
+        for i in range(NAV):
+            g[P + (NAV + k) * STRIDE + i] = decay * g[U + (NAV + k) * NAV_STRIDE + i]
+        for i in range(12):
+            g[P + (NAV + k) * STRIDE + NAV + i] *= decay * g[FACTOR + i]
     for i in range(NAV):
         for j in range(i, NAV):
             g[P + i * STRIDE + j] = g[V + i * NAV_STRIDE + j]
             g[P + j * STRIDE + i] = g[V + i * NAV_STRIDE + j]
-    for k in range(12):
-        decay = 1.0 - dt * g[DECAY + k]
-        for i in range(NAV):
-            covariance = decay * g[T + i * STRIDE + NAV + k]
-            g[P + i * STRIDE + NAV + k] = covariance
-            g[P + (NAV + k) * STRIDE + i] = covariance
-        for i in range(12):
-            g[P + (NAV + k) * STRIDE + NAV + i] *= decay * (1.0 - dt * g[DECAY + i])
+
+
+@kernel
+def predict(g: Array, dt: float) -> None:
+    """Advance P by dt, paper A (5), with Phi = I + F dt and trapezoidal noise.
+
+    Phi P Phi' + (Phi Q Phi' + Q) / 2 = Phi (P + Q / 2) Phi' + Q / 2; only the blocks of Phi that are neither zero
+    nor one are multiplied.
+    """
+    _add_half_noise(g, dt)
+    _navigation_rows_of_phi_p(g, dt)
+    _navigation_rows_of_phi_u(g, dt)
+    _take_over(g, dt)
     _add_half_noise(g, dt)
