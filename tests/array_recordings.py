@@ -63,15 +63,15 @@ def scaled(noise: NoiseGrade, factor: float) -> NoiseGrade:
     return replace(noise, correlation_time=noise.correlation_time / factor, **changes)
 
 
-def board(count: int, seed: int, *, equal: bool = False) -> Rig:
-    """IMUs spread over 0.8 m, each with noise and initial errors of its own unless they are equal."""
+def board(count: int, seed: int, *, equal: bool = False, spread: float = 0.4) -> Rig:
+    """IMUs within `spread` m of the origin in each axis, each with noise of its own unless they are equal."""
     rng = np.random.default_rng([seed, 1])
     imus = []
     for i in range(count):
         noise = NOISE if equal else scaled(NOISE, rng.uniform(0.5, 2.0))
         sizes = (noise.gyro_bias_std, noise.accel_bias_std, noise.gyro_scale_std, noise.accel_scale_std)
         errors = ImuErrors(*(0.3 * size * rng.standard_normal(3) for size in sizes))
-        imus.append(Imu(f"imu{i + 1}", noise, position=rng.uniform(-0.4, 0.4, 3), initial_errors=errors))
+        imus.append(Imu(f"imu{i + 1}", noise, position=rng.uniform(-spread, spread, 3), initial_errors=errors))
     return Rig(tuple(imus), ANTENNA)
 
 
@@ -124,12 +124,13 @@ def shaken_recording(
     seed: int = 1,
     rate_hz: float = 200.0,
     equal: bool = False,
+    spread: float = 0.4,
     truth: Path | None = None,
     place: Array = np.array(START),
 ) -> Recording:
     """An array that is shaken from its start, with GNSS at the times of `fixes`; no velocities, no gate."""
     truth = truth or shaken_path(duration, start=place)
-    rig = board(count, seed, equal=equal)
+    rig = board(count, seed, equal=equal, spread=spread)
     times = np.arange(0.4, duration, 0.4) if fixes is None else fixes
     gnss = received(truth, rig.antenna, times, seed)
     reference_time = np.arange(1.0, np.floor(duration * 10.0)) / 10.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from polyins.kernels import share
 from polyins.kernels.jit import Array, kernel
-from polyins.kernels.share import NAV, STATES, STRIDE, P
+from polyins.kernels.share import HALF, NAV, STATES, STRIDE, P
 
 NOISES = 18
 
@@ -23,23 +23,10 @@ def workspace() -> tuple[Array, Array]:
 @kernel
 def _fill_phi(g: Array, dt: float, phi: Array) -> None:
     phi[:] = 0.0
-    for i in range(STATES):
-        phi[i, i] = 1.0
-    for i in range(3):
-        phi[i, 3 + i] = dt
-        for j in range(3):
-            k = 3 * i + j
-            phi[i, j] += g[share.F_RR + k]
-            phi[3 + i, j] = g[share.F_VR + k]
-            phi[3 + i, 3 + j] += g[share.F_VV + k]
-            phi[3 + i, 6 + j] = g[share.F_VP + k]
-            phi[3 + i, 12 + j] = g[share.F_VA + k]
-            phi[3 + i, 18 + j] = g[share.F_VS + k]
-            phi[6 + i, j] = g[share.F_PR + k]
-            phi[6 + i, 3 + j] = g[share.F_PV + k]
-            phi[6 + i, 6 + j] += g[share.F_PP + k]
-            phi[6 + i, 9 + j] = g[share.F_PG + k]
-            phi[6 + i, 15 + j] = g[share.F_PS + k]
+    for k in range(STATES):
+        for i in range(NAV):
+            phi[i, k] = g[share.F + k * HALF + i]
+        phi[k, k] += 1.0
     for k in range(12):
         phi[NAV + k, NAV + k] -= dt * g[share.DECAY + k]
 
@@ -63,6 +50,7 @@ def predict(g: Array, dt: float, squares: Array, shaping: Array) -> None:
     """Advance P by dt: Qd = (Phi Q Phi' + Q) / 2 with Q = G Qc G' dt, P = Phi P Phi' + Qd; five products."""
     phi, p, q = squares[PHI], squares[COVARIANCE], squares[NOISE]
     product, result = squares[PRODUCT], squares[RESULT]
+    share.mirror(g)
     _fill_phi(g, dt, phi)
     _fill_noise(g, dt, shaping)
     for i in range(STATES):

@@ -38,7 +38,7 @@ def _compiled(function: F, **options: Any) -> F:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(CACHE_FOLDER)
     try:
-        return cast(F, numba.njit(error_model="numpy", nogil=True, **options)(function))
+        return cast(F, numba.njit(error_model="numpy", nogil=True, fastmath={"contract"}, **options)(function))
     finally:
         numba.config.CACHE_DIR = before
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from polyins.kernels.jit import Array, kernel
-from polyins.kernels.share import STATES, STRIDE, P
+from polyins.kernels.share import STATES, STRIDE, P, mirror
 
 ROWS = 3
 
@@ -33,6 +33,7 @@ SIZE = (_fields + 7) // 8 * 8
 @kernel
 def gain(g: Array, m: Array) -> None:
     """Write H P, S = H P H' + R, its inverse and K = P H' / S, paper A (8)."""
+    mirror(g)
     for a in range(ROWS):
         for j in range(STRIDE):
             total = 0.0

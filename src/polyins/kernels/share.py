@@ -13,9 +13,12 @@ from polyins.kernels import earth
 from polyins.kernels.jit import Array, formula, kernel
 
 STATES = 21
-STRIDE = 24  # a row of P, padded to whole vectors
 NAV = 9  # position, velocity, phi
-NAV_STRIDE = 12
+# Loops over columns have constant bounds and whole vectors of eight. What they compute beyond the columns that count is
+# finite and never used, or overwritten.
+STRIDE = 24
+HALF = 16
+SENSORS = 8  # from here on a row of P holds the covariances with IMU errors, of which the first is in column 9
 
 _fields = 0
 
@@ -42,29 +45,21 @@ GYRO_PSD = _take(3)  # angle random walk squared, rad^2/s
 ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
 ERROR_PSD = _take(12)  # 2 sigma^2 / tau of each Gauss-Markov process
 DECAY = _take(12)  # 1 / tau
-FACTOR = _take(12)  # 1 - dt / tau
-# error model times dt: rows velocity and phi of F, 3 x 3 each
-F_RR = _take(9)
-F_VR = _take(9)
-F_VV = _take(9)
-F_VP = _take(9)
-F_VA = _take(9)  # accelerometer bias
-F_VS = _take(9)  # accelerometer scale
-F_PR = _take(9)
-F_PV = _take(9)
-F_PP = _take(9)
-F_PG = _take(9)  # gyro bias
-F_PS = _take(9)  # gyro scale
+FACTOR = _take(STRIDE)  # 1 - dt / tau by column
+# error model times dt: row k holds what state k does to position, velocity and phi, that is F' without its zero rows
+F = _take(STATES * HALF)
 HALF_Q_V = _take(9)
 HALF_Q_P = _take(9)
 # products
-T = _take(NAV * STRIDE)  # the navigation rows of Phi P
-U = _take(STATES * NAV_STRIDE)  # T transposed
-V = _take(NAV * NAV_STRIDE)
+T = _take(NAV * STRIDE)
+W = _take(NAV * HALF)
+V = _take(NAV * SENSORS)
+Z = _take(NAV * SENSORS)
 
 SIZE = (_fields + 7) // 8 * 8
 
-_R, _V, _P, _G, _A, _GS, _AS = 0, 3, 6, 9, 12, 15, 18
+_V, _P, _G, _A, _GS, _AS = 3, 6, 9, 12, 15, 18
+BY_N, BY_E, BY_D, BY_VN, BY_VE, BY_VD = (F + k * HALF for k in range(6))
 
 
 @kernel
@@ -92,48 +87,48 @@ def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: floa
     tn, te, td = ve * n, -vn * m, -ve * n * t
     sec2 = 1.0 + t * t
 
-    g[F_RR + 0] = -vd * m * dt
-    g[F_RR + 2] = vn * m * dt
-    g[F_RR + 3] = ve * t * m * dt
-    g[F_RR + 4] = -(vd * n + vn * t * m) * dt
-    g[F_RR + 5] = ve * n * dt
+    g[BY_N + 0] = -vd * m * dt
+    g[BY_D + 0] = vn * m * dt
+    g[BY_N + 1] = ve * t * m * dt
+    g[BY_E + 1] = -(vd * n + vn * t * m) * dt
+    g[BY_D + 1] = ve * n * dt
 
-    g[F_VR + 0] = -(2.0 * ve * wn + ve * ve * n * sec2) * m * dt
-    g[F_VR + 2] = (vn * vd * m * m - ve * ve * t * n * n) * dt
-    g[F_VR + 3] = (2.0 * (vn * wn + vd * wd) + vn * ve * n * sec2) * m * dt
-    g[F_VR + 5] = (ve * vd + vn * ve * t) * n * n * dt
-    g[F_VR + 6] = -2.0 * ve * wd * m * dt
-    g[F_VR + 8] = (-ve * ve * n * n - vn * vn * m * m + 2.0 * gravity / (math.sqrt(r_m * r_n) + height)) * dt
+    g[BY_N + 3] = -(2.0 * ve * wn + ve * ve * n * sec2) * m * dt
+    g[BY_D + 3] = (vn * vd * m * m - ve * ve * t * n * n) * dt
+    g[BY_N + 4] = (2.0 * (vn * wn + vd * wd) + vn * ve * n * sec2) * m * dt
+    g[BY_D + 4] = (ve * vd + vn * ve * t) * n * n * dt
+    g[BY_N + 5] = -2.0 * ve * wd * m * dt
+    g[BY_D + 5] = (-ve * ve * n * n - vn * vn * m * m + 2.0 * gravity / (math.sqrt(r_m * r_n) + height)) * dt
 
-    g[F_VV + 0] = vd * m * dt
-    g[F_VV + 1] = 2.0 * (wd + td) * dt
-    g[F_VV + 2] = -te * dt
-    g[F_VV + 3] = -(2.0 * wd + td) * dt
-    g[F_VV + 4] = (vd + vn * t) * n * dt
-    g[F_VV + 5] = (2.0 * wn + tn) * dt
-    g[F_VV + 6] = 2.0 * te * dt
-    g[F_VV + 7] = -2.0 * (wn + tn) * dt
+    g[BY_VN + 3] = vd * m * dt
+    g[BY_VE + 3] = 2.0 * (wd + td) * dt
+    g[BY_VD + 3] = -te * dt
+    g[BY_VN + 4] = -(2.0 * wd + td) * dt
+    g[BY_VE + 4] = (vd + vn * t) * n * dt
+    g[BY_VD + 4] = (2.0 * wn + tn) * dt
+    g[BY_VN + 5] = 2.0 * te * dt
+    g[BY_VE + 5] = -2.0 * (wn + tn) * dt
 
-    g[F_PR + 0] = wd * m * dt
-    g[F_PR + 2] = ve * n * n * dt
-    g[F_PR + 5] = -vn * m * m * dt
-    g[F_PR + 6] = -(wn + ve * n * sec2) * m * dt
-    g[F_PR + 8] = -ve * t * n * n * dt
-    g[F_PV + 1] = n * dt
-    g[F_PV + 3] = -m * dt
-    g[F_PV + 7] = -t * n * dt
+    g[BY_N + 6] = wd * m * dt
+    g[BY_D + 6] = ve * n * n * dt
+    g[BY_D + 7] = -vn * m * m * dt
+    g[BY_N + 8] = -(wn + ve * n * sec2) * m * dt
+    g[BY_D + 8] = -ve * t * n * n * dt
+    g[BY_VE + 6] = n * dt
+    g[BY_VN + 7] = -m * dt
+    g[BY_VE + 8] = -t * n * dt
 
-    _skew(g, F_PP, -(wn + tn) * dt, -te * dt, -(wd + td) * dt)
+    _skew(g, _P, _P, -(wn + tn) * dt, -te * dt, -(wd + td) * dt)
 
 
 @kernel
-def _skew(g: Array, offset: int, x: float, y: float, z: float) -> None:
-    g[offset + 1] = -z
-    g[offset + 2] = y
-    g[offset + 3] = z
-    g[offset + 5] = -x
-    g[offset + 6] = -y
-    g[offset + 7] = x
+def _skew(g: Array, row: int, column: int, x: float, y: float, z: float) -> None:
+    """Write the block (x, y, z) x of F."""
+    c0 = F + column * HALF + row
+    c1, c2 = c0 + HALF, c0 + 2 * HALF
+    g[c0 + 1], g[c0 + 2] = z, -y
+    g[c1], g[c1 + 2] = -z, x
+    g[c2], g[c2 + 1] = y, -x
 
 
 @kernel
@@ -143,14 +138,14 @@ def _sensor_terms(g: Array, dt: float) -> None:
     n = g[MATRIX] * fx + g[MATRIX + 1] * fy + g[MATRIX + 2] * fz
     e = g[MATRIX + 3] * fx + g[MATRIX + 4] * fy + g[MATRIX + 5] * fz
     d = g[MATRIX + 6] * fx + g[MATRIX + 7] * fy + g[MATRIX + 8] * fz
-    _skew(g, F_VP, n * dt, e * dt, d * dt)
+    _skew(g, _V, _P, n * dt, e * dt, d * dt)
     for i in range(3):
         for j in range(3):
             c = g[MATRIX + 3 * i + j] * dt
-            g[F_VA + 3 * i + j] = c
-            g[F_VS + 3 * i + j] = c * g[FORCE + j]
-            g[F_PG + 3 * i + j] = -c
-            g[F_PS + 3 * i + j] = -c * g[RATE + j]
+            g[F + (_A + j) * HALF + _V + i] = c
+            g[F + (_AS + j) * HALF + _V + i] = c * g[FORCE + j]
+            g[F + (_G + j) * HALF + _P + i] = -c
+            g[F + (_GS + j) * HALF + _P + i] = -c * g[RATE + j]
             q_v = 0.0
             q_p = 0.0
             for k in range(3):
@@ -164,107 +159,178 @@ def _sensor_terms(g: Array, dt: float) -> None:
 @kernel
 def error_model(g: Array, dt: float, near: Array) -> None:
     """Write F dt and Q dt / 2 at the fused state, which is that of the start of the interval."""
+    for i in range(3):
+        g[F + (_V + i) * HALF + i] = dt
     if near[0] != 0.0:
         _earth_terms(g, dt, near[1], near[2], near[3])
     _sensor_terms(g, dt)
 
 
-@formula
-def _product(g: Array, source: int, stride: int, j: int, f: tuple[float, float, float]) -> float:
-    return f[0] * g[source + j] + f[1] * g[source + stride + j] + f[2] * g[source + 2 * stride + j]
+Three = tuple[float, float, float]
 
 
 @formula
-def _skew_product(g: Array, source: int, stride: int, j: int, i: int, f: tuple[float, float]) -> float:
-    return f[0] * g[source + (i + 1) % 3 * stride + j] + f[1] * g[source + (i + 2) % 3 * stride + j]
+def _factors(g: Array, i: int, column: int) -> Three:
+    """Row i of F dt in three columns."""
+    f = F + column * HALF + i
+    return g[f], g[f + HALF], g[f + 2 * HALF]
 
 
 @formula
-def _outer_product(g: Array, source: int, stride: int, j: int, f: tuple[float, float]) -> float:
-    return f[0] * g[source + j] + f[1] * g[source + 2 * stride + j]
+def _column(g: Array, x: int, stride: int) -> Three:
+    return g[x], g[x + stride], g[x + 2 * stride]
 
 
 @formula
-def _triple(g: Array, f: int, i: int) -> tuple[float, float, float]:
-    return g[f + 3 * i], g[f + 3 * i + 1], g[f + 3 * i + 2]
+def _dot(a: Three, b: Three) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+Row = tuple[float, float, Three, float, float]
 
 
 @formula
-def _skew_pair(g: Array, f: int, i: int) -> tuple[float, float]:
-    return g[f + 3 * i + (i + 1) % 3], g[f + 3 * i + (i + 2) % 3]
+def _row(g: Array, i: int) -> Row:
+    """Row i of F dt among the navigation states: no error depends on longitude, phi enters as a vector product."""
+    k, m = _P + (i + 1) % 3, _P + (i + 2) % 3
+    return g[F + i], g[F + 2 * HALF + i], _factors(g, i, _V), g[F + k * HALF + i], g[F + m * HALF + i]
 
 
 @formula
-def _position_row(g: Array, i: int, source: int, stride: int, target: int, begin: int, end: int, dt: float) -> None:
-    r = _triple(g, F_RR, i)
-    for j in range(begin, end):
-        g[target + i * stride + j] = (
-            g[source + i * stride + j] + dt * g[source + (_V + i) * stride + j] + _product(g, source, stride, j, r)
-        )
-
-
-@formula
-def _velocity_row(g: Array, i: int, source: int, stride: int, target: int, begin: int, end: int) -> None:
-    r = g[F_VR + 3 * i], g[F_VR + 3 * i + 2]  # no error depends on longitude
-    v, p = _triple(g, F_VV, i), _skew_pair(g, F_VP, i)
-    a, s = _triple(g, F_VA, i), _triple(g, F_VS, i)
-    for j in range(begin, end):
-        g[target + (_V + i) * stride + j] = (
-            g[source + (_V + i) * stride + j]
-            + _outer_product(g, source + _R * stride, stride, j, r)
-            + _product(g, source + _V * stride, stride, j, v)
-            + _skew_product(g, source + _P * stride, stride, j, i, p)
-            + _product(g, source + _A * stride, stride, j, a)
-            + _product(g, source + _AS * stride, stride, j, s)
-        )
-
-
-@formula
-def _phi_row(g: Array, i: int, source: int, stride: int, target: int, begin: int, end: int) -> None:
-    r = g[F_PR + 3 * i], g[F_PR + 3 * i + 2]
-    column = 1 - i % 2  # north and down turn with east velocity, east with north velocity
-    v, p = g[F_PV + 3 * i + column], _skew_pair(g, F_PP, i)
-    b, s = _triple(g, F_PG, i), _triple(g, F_PS, i)
-    for j in range(begin, end):
-        g[target + (_P + i) * stride + j] = (
-            g[source + (_P + i) * stride + j]
-            + _outer_product(g, source + _R * stride, stride, j, r)
-            + v * g[source + (_V + column) * stride + j]
-            + _skew_product(g, source + _P * stride, stride, j, i, p)
-            + _product(g, source + _G * stride, stride, j, b)
-            + _product(g, source + _GS * stride, stride, j, s)
-        )
+def _times(f: Row, r: Three, v: Three, p1: float, p2: float) -> float:
+    return (f[0] * r[0] + f[1] * r[2]) + _dot(f[2], v) + (f[3] * p1 + f[4] * p2)
 
 
 @kernel
-def _navigation_rows_of_phi_p(g: Array, dt: float) -> None:
-    """T = the navigation rows of Phi P."""
-    _position_row(g, 0, P, STRIDE, T, 0, STRIDE, dt)
-    _position_row(g, 1, P, STRIDE, T, 0, STRIDE, dt)
-    _position_row(g, 2, P, STRIDE, T, 0, STRIDE, dt)
-    _velocity_row(g, 0, P, STRIDE, T, 0, STRIDE)
-    _velocity_row(g, 1, P, STRIDE, T, 0, STRIDE)
-    _velocity_row(g, 2, P, STRIDE, T, 0, STRIDE)
-    _phi_row(g, 0, P, STRIDE, T, 0, STRIDE)
-    _phi_row(g, 1, P, STRIDE, T, 0, STRIDE)
-    _phi_row(g, 2, P, STRIDE, T, 0, STRIDE)
+def _through_navigation(g: Array, dt: float) -> None:
+    """T = A [N C]."""
+    # all factors before the loop: loads in it that do not move would keep it from vectorizing
+    f0, f1 = _factors(g, 0, 0), _factors(g, 1, 0)
+    f3, f4, f5, f6, f7, f8 = _row(g, 3), _row(g, 4), _row(g, 5), _row(g, 6), _row(g, 7), _row(g, 8)
+    for j in range(STRIDE):
+        r = _column(g, P + j, STRIDE)
+        v = _column(g, P + _V * STRIDE + j, STRIDE)
+        p = _column(g, P + _P * STRIDE + j, STRIDE)
+        g[T + j] = r[0] + dt * v[0] + _dot(f0, r)
+        g[T + STRIDE + j] = r[1] + dt * v[1] + _dot(f1, r)
+        g[T + 2 * STRIDE + j] = r[2] + dt * v[2]
+        g[T + 3 * STRIDE + j] = v[0] + _times(f3, r, v, p[1], p[2])
+        g[T + 4 * STRIDE + j] = v[1] + _times(f4, r, v, p[2], p[0])
+        g[T + 5 * STRIDE + j] = v[2] + _times(f5, r, v, p[0], p[1])
+        g[T + 6 * STRIDE + j] = p[0] + _times(f6, r, v, p[1], p[2])
+        g[T + 7 * STRIDE + j] = p[1] + _times(f7, r, v, p[2], p[0])
+        g[T + 8 * STRIDE + j] = p[2] + _times(f8, r, v, p[0], p[1])
+
+
+@formula
+def _put_c(g: Array, i: int, j: int, half: float) -> None:
+    """Element of W = A C + G B / 2 and of the new C = (A C + G B) D."""
+    w = g[T + i * STRIDE + SENSORS + j] + half
+    g[W + i * HALF + j] = w
+    g[P + i * STRIDE + SENSORS + j] = g[FACTOR + SENSORS + j] * (w + half)
+
+
+@formula
+def _half(f: Three, b: Three, h: Three, s: Three) -> float:
+    return 0.5 * (_dot(f, b) + _dot(h, s))
+
+
+@formula
+def _decay(g: Array, k: int, j: int, factors: Three, b: Three) -> None:
+    """Three rows of B <- D B D."""
+    factor = g[FACTOR + SENSORS + j]
+    g[P + k * STRIDE + SENSORS + j] = factors[0] * factor * b[0]
+    g[P + (k + 1) * STRIDE + SENSORS + j] = factors[1] * factor * b[1]
+    g[P + (k + 2) * STRIDE + SENSORS + j] = factors[2] * factor * b[2]
 
 
 @kernel
-def _navigation_rows_of_phi_u(g: Array, dt: float) -> None:
-    """V = Phi U with U = T', so that V is the navigation block of Phi P Phi'; its upper blocks suffice."""
-    for k in range(STATES):
-        for j in range(NAV):
-            g[U + k * NAV_STRIDE + j] = g[T + j * STRIDE + k]
-    _position_row(g, 0, U, NAV_STRIDE, V, 0, 12, dt)
-    _position_row(g, 1, U, NAV_STRIDE, V, 0, 12, dt)
-    _position_row(g, 2, U, NAV_STRIDE, V, 0, 12, dt)
-    _velocity_row(g, 0, U, NAV_STRIDE, V, 3, 11)
-    _velocity_row(g, 1, U, NAV_STRIDE, V, 3, 11)
-    _velocity_row(g, 2, U, NAV_STRIDE, V, 3, 11)
-    _phi_row(g, 0, U, NAV_STRIDE, V, 6, 10)
-    _phi_row(g, 1, U, NAV_STRIDE, V, 6, 10)
-    _phi_row(g, 2, U, NAV_STRIDE, V, 6, 10)
+def _through_sensors(g: Array, dt: float) -> None:
+    """Bring B and C up to date and leave W behind."""
+    for k in range(12):
+        g[FACTOR + NAV + k] = 1.0 - dt * g[DECAY + k]
+    f3, f4, f5 = _factors(g, 3, _A), _factors(g, 4, _A), _factors(g, 5, _A)
+    f6, f7, f8 = _factors(g, 6, _G), _factors(g, 7, _G), _factors(g, 8, _G)
+    h3, h4, h5 = _factors(g, 3, _AS), _factors(g, 4, _AS), _factors(g, 5, _AS)
+    h6, h7, h8 = _factors(g, 6, _GS), _factors(g, 7, _GS), _factors(g, 8, _GS)
+    d_b, d_a = _column(g, FACTOR + _G, 1), _column(g, FACTOR + _A, 1)
+    d_sb, d_sa = _column(g, FACTOR + _GS, 1), _column(g, FACTOR + _AS, 1)
+    for j in range(HALF):
+        b = _column(g, P + _G * STRIDE + SENSORS + j, STRIDE)
+        a = _column(g, P + _A * STRIDE + SENSORS + j, STRIDE)
+        sb = _column(g, P + _GS * STRIDE + SENSORS + j, STRIDE)
+        sa = _column(g, P + _AS * STRIDE + SENSORS + j, STRIDE)
+        _put_c(g, 0, j, 0.0)
+        _put_c(g, 1, j, 0.0)
+        _put_c(g, 2, j, 0.0)
+        _put_c(g, 3, j, _half(f3, a, h3, sa))
+        _put_c(g, 4, j, _half(f4, a, h4, sa))
+        _put_c(g, 5, j, _half(f5, a, h5, sa))
+        _put_c(g, 6, j, _half(f6, b, h6, sb))
+        _put_c(g, 7, j, _half(f7, b, h7, sb))
+        _put_c(g, 8, j, _half(f8, b, h8, sb))
+        _decay(g, _G, j, d_b, b)
+        _decay(g, _A, j, d_a, a)
+        _decay(g, _GS, j, d_sb, sb)
+        _decay(g, _AS, j, d_sa, sa)
+
+
+@formula
+def _back_row(g: Array, i: int) -> None:
+    """Row i of V = (A N) A' and of Z = W G', the first eight columns."""
+    t, w = T + i * STRIDE, W + i * HALF - SENSORS
+    r, v, p = _column(g, t, 1), _column(g, t + _V, 1), _column(g, t + _P, 1)
+    b, a = _column(g, w + _G, 1), _column(g, w + _A, 1)
+    sb, sa = _column(g, w + _GS, 1), _column(g, w + _AS, 1)
+    for j in range(SENSORS):
+        f = F + j
+        g[V + i * SENSORS + j] = (
+            (g[t + j] + _dot(r, _column(g, f, HALF)))
+            + _dot(v, _column(g, f + _V * HALF, HALF))
+            + _dot(p, _column(g, f + _P * HALF, HALF))
+        )
+        g[Z + i * SENSORS + j] = (
+            _dot(b, _column(g, f + _G * HALF, HALF)) + _dot(a, _column(g, f + _A * HALF, HALF))
+        ) + (_dot(sb, _column(g, f + _GS * HALF, HALF)) + _dot(sa, _column(g, f + _AS * HALF, HALF)))
+
+
+@kernel
+def _back_to_navigation(g: Array) -> None:
+    """N = V + Z + Z'; the loop makes the first eight columns, the ninth follows from symmetry."""
+    _back_row(g, 0)
+    _back_row(g, 1)
+    _back_row(g, 2)
+    _back_row(g, 3)
+    _back_row(g, 4)
+    _back_row(g, 5)
+    _back_row(g, 6)
+    _back_row(g, 7)
+    _back_row(g, 8)
+    _last_column(g)
+    for i in range(NAV - 1):
+        for j in range(i, NAV - 1):
+            n = g[V + i * SENSORS + j] + (g[Z + i * SENSORS + j] + g[Z + j * SENSORS + i])
+            g[P + i * STRIDE + j] = n
+            g[P + j * STRIDE + i] = n
+
+
+@kernel
+def _last_column(g: Array) -> None:
+    last = NAV - 1
+    own = g[T + last * STRIDE + last]
+    for k in range(NAV):
+        own += g[T + last * STRIDE + k] * g[F + k * HALF + last]
+    for i in range(NAV):
+        z = 0.0
+        for k in range(3):
+            z += g[W + i * HALF + _G - SENSORS + k] * g[F + (_G + k) * HALF + last]
+            z += g[W + i * HALF + _GS - SENSORS + k] * g[F + (_GS + k) * HALF + last]
+        if i == last:
+            n = own + 2.0 * z
+        else:
+            n = g[V + last * SENSORS + i] + (g[Z + last * SENSORS + i] + z)
+        g[P + i * STRIDE + last] = n
+        g[P + last * STRIDE + i] = n
 
 
 @kernel
@@ -278,34 +344,26 @@ def _add_half_noise(g: Array, dt: float) -> None:
 
 
 @kernel
-def _take_over(g: Array, dt: float) -> None:
-    """Put the products in their places in P; the IMU errors decay, and the lower triangle mirrors the upper one."""
-    for k in range(12):
-        g[FACTOR + k] = 1.0 - dt * g[DECAY + k]
-    for i in range(NAV):
-        for k in range(12):
-            g[P + i * STRIDE + NAV + k] = g[FACTOR + k] * g[T + i * STRIDE + NAV + k]
-    for k in range(12):
-        decay = g[FACTOR + k]
-        for i in range(NAV):
-            g[P + (NAV + k) * STRIDE + i] = decay * g[U + (NAV + k) * NAV_STRIDE + i]
-        for i in range(12):
-            g[P + (NAV + k) * STRIDE + NAV + i] *= decay * g[FACTOR + i]
-    for i in range(NAV):
-        for j in range(i, NAV):
-            g[P + i * STRIDE + j] = g[V + i * NAV_STRIDE + j]
-            g[P + j * STRIDE + i] = g[V + i * NAV_STRIDE + j]
-
-
-@kernel
 def predict(g: Array, dt: float) -> None:
     """Advance P by dt, paper A (5), with Phi = I + F dt and trapezoidal noise.
 
-    Phi P Phi' + (Phi Q Phi' + Q) / 2 = Phi (P + Q / 2) Phi' + Q / 2; only the blocks of Phi that are neither zero
-    nor one are multiplied.
+    Phi P Phi' + (Phi Q Phi' + Q) / 2 = Phi (P + Q / 2) Phi' + Q / 2. With P = [N C; C' B] in navigation states and
+    IMU errors and Phi = [A G; 0 D], D diagonal:
+
+        B <- D B D,    C <- (A C + G B) D,    N <- A N A' + W G' + (W G')',    W = A C + G B / 2
+
+    Only what is neither zero nor one is multiplied, and C' is left behind: `mirror` brings it up to date.
     """
     _add_half_noise(g, dt)
-    _navigation_rows_of_phi_p(g, dt)
-    _navigation_rows_of_phi_u(g, dt)
-    _take_over(g, dt)
+    _through_navigation(g, dt)
+    _through_sensors(g, dt)
+    _back_to_navigation(g)
     _add_half_noise(g, dt)
+
+
+@kernel
+def mirror(g: Array) -> None:
+    """Write the lower left block of P, which predictions leave behind, from the upper right one."""
+    for i in range(NAV):
+        for k in range(NAV, STATES):
+            g[P + k * STRIDE + i] = g[P + i * STRIDE + k]
