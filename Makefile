@@ -20,8 +20,8 @@ test: $(BIN)/pytest
 	$(BIN)/pytest
 
 lint: $(BIN)/pytest
-	$(BIN)/ruff check src tests benchmarks
-	$(BIN)/ruff format --check src tests benchmarks
+	$(BIN)/ruff check src tests
+	$(BIN)/ruff format --check src tests
 
 types: $(BIN)/pytest
 	$(BIN)/mypy

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from polyins import alignment
 from polyins.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.rig import DEG, Imu, ImuErrors, NoiseGrade, Rig
-from polyins.simulate.increments import increments
-from polyins.simulate.path import START, Path, path
+from polyins.simulation.increments import increments
+from polyins.simulation.path import START, Path, path
 
 Array = NDArray[np.float64]
 

@@ -325,9 +325,7 @@ def noise_density(C: Array, noise: NoiseGrade) -> Array:
     return (G * Qc) @ G.T
 
 
-def predict(
-    earth: Earth, P: Array, state: State, rate: Array, force: Array, dt: float, noise: NoiseGrade
-) -> Array:
+def predict(earth: Earth, P: Array, state: State, rate: Array, force: Array, dt: float, noise: NoiseGrade) -> Array:
     """Phi P Phi' + Qd with Phi = I + F dt and Qd = (Phi Q Phi' + Q) / 2, all at the start of the interval."""
     Phi = np.eye(21) + error_dynamics(earth, state, rate, force, noise.correlation_time) * dt
     Q = noise_density(state.C, noise) * dt
@@ -478,9 +476,7 @@ class Bank:
     def correct(self, residuals: list[Array], designs: list[Array], Rm: Array) -> None:
         """One gain per covariance; each IMU its own residual, times the gain of its covariance."""
         gains = [gain(P, H, Rm) for P, H in zip(self.covariances, designs, strict=True)]
-        self.covariances = [
-            joseph(P, K, H, Rm) for P, K, H in zip(self.covariances, gains, designs, strict=True)
-        ]
+        self.covariances = [joseph(P, K, H, Rm) for P, K, H in zip(self.covariances, gains, designs, strict=True)]
         gain_of_imu = gains if len(gains) == len(self.states) else gains * len(self.states)
         self.states = [
             feed_back(self.earth, s, K @ z) for s, K, z in zip(self.states, gain_of_imu, residuals, strict=True)

@@ -36,7 +36,7 @@ from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
 from polyins.methods import METHODS
 from polyins.recording import FilterOptions, GnssStream, Recording
-from polyins.rig import DEG, Imu, NoiseGrade, Rig
+from polyins.rig import DEG, NoiseGrade, Rig
 
 Array = NDArray[np.float64]
 
@@ -109,9 +109,7 @@ def mean_noise(rig: Rig) -> NoiseGrade:
         return np.sqrt(np.mean([getattr(noise, name) ** 2 for noise in noises], axis=0))
 
     def steady(name: str) -> Array:
-        return np.sqrt(
-            time * np.mean([getattr(noise, name) ** 2 / noise.correlation_time for noise in noises], axis=0)
-        )
+        return np.sqrt(time * np.mean([getattr(noise, name) ** 2 / noise.correlation_time for noise in noises], axis=0))
 
     slow = ("gyro_bias_std", "accel_bias_std", "gyro_scale_std", "accel_scale_std")
     return NoiseGrade(
@@ -181,9 +179,7 @@ def differences(recording: Recording, method: str) -> dict[str, float]:
     assert len(run.outputs.innovations) == len(FIX_TIMES)
     return {
         "position": np.abs((states[:, :3] - expected["position"][1:]) * metres).max(),
-        "imu position": np.abs(
-            (of_each_imu(run, bank.POSITION, 3) - expected["imu_position"][-1]) * metres
-        ).max(),
+        "imu position": np.abs((of_each_imu(run, bank.POSITION, 3) - expected["imu_position"][-1]) * metres).max(),
         "velocity": np.abs(states[:, 3:6] - expected["velocity"][1:]).max(),
         "attitude": turned.magnitude().max(),
         "covariance": np.abs((P - reference_P) / (sigma[:, :, None] * sigma[:, None, :])).max(),
@@ -204,9 +200,7 @@ def with_noise_of_one(recording: Recording) -> Recording:
 
 
 def assert_agree(actual: dict[str, float], tolerance: float, **others: float) -> None:
-    wrong = {
-        name: value for name, value in actual.items() if not value < others.get(name.replace(" ", "_"), tolerance)
-    }
+    wrong = {name: value for name, value in actual.items() if not value < others.get(name.replace(" ", "_"), tolerance)}
     assert not wrong
 
 
@@ -461,9 +455,7 @@ def test_a_lying_fix_is_rejected_and_leaves_no_trace(method: str) -> None:
 
     def without(gnss: GnssStream) -> GnssStream:
         kept = np.arange(len(gnss.time)) != 6
-        return replace(
-            gnss, time=gnss.time[kept], position=gnss.position[kept], position_std=gnss.position_std[kept]
-        )
+        return replace(gnss, time=gnss.time[kept], position=gnss.position[kept], position_std=gnss.position_std[kept])
 
     assert recording.gnss is not None
     missing = batch.run(replace(recording, gnss=without(recording.gnss)), method)

@@ -492,8 +492,7 @@ TIME = np.arange(300) / 200.0
 HOME = State(np.array([30.46 * DEG, 114.47 * DEG, 20.0]), np.zeros(3), quaternion_of_euler(0.0, 0.0, 1.0))
 NEAR_HOME = HOME.position + np.array([1e-9, -2e-9, 0.01])
 FIXES = [
-    Fix(t, NEAR_HOME, np.full(3, 0.02), np.array([0.01, 0.0, 0.0]), np.full(3, 0.05))
-    for t in (0.3021, 0.7, 1.1033)
+    Fix(t, NEAR_HOME, np.full(3, 0.02), np.array([0.01, 0.0, 0.0]), np.full(3, 0.05)) for t in (0.3021, 0.7, 1.1033)
 ]
 
 

@@ -23,7 +23,7 @@ from written_recordings import (
 )
 
 from polyins.errors import InputError
-from polyins.load import load
+from polyins.loading import load
 
 Values = dict[str, Any]
 Spoil = Callable[[Path, Values], None]

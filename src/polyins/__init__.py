@@ -19,39 +19,39 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from polyins import datasets as datasets
     from polyins.batch import run as run
-    from polyins.compare import compare as compare
+    from polyins.comparison import compare as compare
     from polyins.errors import InputError as InputError
-    from polyins.evaluate.summary import summarize as evaluate
-    from polyins.load import load as load
+    from polyins.evaluation.summary import summarize as evaluate
+    from polyins.loading import load as load
     from polyins.recording import Recording as Recording
     from polyins.rig import Imu as Imu
     from polyins.rig import NoiseGrade as NoiseGrade
     from polyins.rig import Rig as Rig
-    from polyins.simulate.scenario import simulate as simulate
+    from polyins.simulation.scenario import simulate as simulate
     from polyins.solution import Solution as Solution
 
-_PUBLIC = {
+_HOMES = {
     "InputError": "errors",
     "Imu": "rig",
     "NoiseGrade": "rig",
     "Recording": "recording",
     "Rig": "rig",
     "Solution": "solution",
-    "compare": "compare",
-    "evaluate": "evaluate.summary:summarize",
-    "load": "load",
+    "compare": "comparison",
+    "load": "loading",
     "run": "batch",
-    "simulate": "simulate.scenario",
+    "simulate": "simulation.scenario",
 }
 
-__all__ = ["__version__", "datasets", *_PUBLIC]
+__all__ = ["__version__", "datasets", "evaluate", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that the command line starts fast."""
     if name == "datasets":
         return importlib.import_module("polyins.datasets")
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'polyins' has no attribute {name!r}")
-    module, _, attribute = _PUBLIC[name].partition(":")
-    return getattr(importlib.import_module(f"polyins.{module}"), attribute or name)
+    if name == "evaluate":
+        return importlib.import_module("polyins.evaluation.summary").summarize
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"polyins.{_HOMES[name]}"), name)
+    raise AttributeError(f"module 'polyins' has no attribute {name!r}")

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from polyins import alignment, engine, timesync
 from polyins.alignment import Start
 from polyins.engine import Inputs, Outputs, Plan, State
-from polyins.errors import InputError
 from polyins.kernels import bank, dense, kalman, share
 from polyins.kernels.bank import LANES
 from polyins.methods import Method, find_method
@@ -175,7 +174,7 @@ def _fill_lane(w: Array, lane: int, member: Member, start: Start, c: Array, metr
 
 
 def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None:
-    """A share is driven by the noise of its mean member."""
+    """Give a share the noise of its mean member."""
     noises = [member.imu.noise for member in members]
     std = np.sqrt(np.mean([member.start_error_std**2 for member in members], axis=0))
     variances = np.concatenate([start.position_std, start.velocity_std, start.attitude_std, std]) ** 2

@@ -67,7 +67,7 @@ def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
 
 def array(count: int) -> Recording:
     """Return a simulated recording of an array of `count` IMUs; those beyond sixteen repeat the first ones."""
-    from polyins.simulate.scenario import Scenario, simulate
+    from polyins.simulation.scenario import Scenario, simulate
 
     recording = simulate(Scenario(duration_s=SECONDS))
     order = [i % len(recording.imus) for i in range(count)]

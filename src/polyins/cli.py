@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -20,7 +21,10 @@ as_json_option = click.option("--json", "as_json", is_flag=True, help="Print one
 no_report_option = click.option("--no-report", is_flag=True, help="Leave out report.html.")
 
 
-def out_option(default: str) -> Any:
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def out_option(default: str) -> Callable[[F], F]:
     """Return the option that names the folder of a command's files."""
     text = "Folder for the files; what is there under the same names is replaced."
     return click.option("--out", type=FOLDER, default=default, show_default=True, help=text)
@@ -61,7 +65,7 @@ def main() -> None:
 @out_option("polyins-demo")
 def demo(out: Path) -> None:
     """Simulate a drive with an array of 16 IMUs, run every array method, show table and report."""
-    from polyins.simulate import files, scenario
+    from polyins.simulation import files, scenario
 
     say("simulating a drive with 16 IMUs and GNSS ...")
     recording = scenario.simulate(scenario.demo())
@@ -80,8 +84,8 @@ def demo(out: Path) -> None:
 def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool) -> None:
     """Run one method over one recording (polyins YAML, or a KF-GINS configuration)."""
     from polyins import batch, results
-    from polyins.evaluate.summary import summarize
-    from polyins.load import load
+    from polyins.evaluation.summary import summarize
+    from polyins.loading import load
     from polyins.methods import find_method
 
     if method is not None:
@@ -122,8 +126,8 @@ def compare(config: Path, methods: str | None, out: Path, as_json: bool, no_repo
 
 def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report: bool) -> None:
     from polyins import results
-    from polyins.compare import compare as run_all
-    from polyins.load import load
+    from polyins.comparison import compare as run_all
+    from polyins.loading import load
     from polyins.methods import METHODS, find_method
 
     names = [find_method(name.strip()).name for name in methods.split(",")] if methods else list(METHODS)
@@ -147,7 +151,7 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
 def evaluate(solution: Path, reference: Path, as_json: bool) -> None:
     """Compare a written solution with a reference."""
     from polyins import results
-    from polyins.evaluate.summary import summarize
+    from polyins.evaluation.summary import summarize
     from polyins.io.position_stream import load_reference
     from polyins.io.solution_files import read_solution
 
@@ -165,8 +169,8 @@ def evaluate(solution: Path, reference: Path, as_json: bool) -> None:
 @click.option("--seed", type=int, default=None, help="Takes the place of the scenario's own.")
 def simulate(scenario: Path, out: Path, seed: int | None) -> None:
     """Simulate the recording that a scenario file describes, with its truth and a configuration to run it."""
-    from polyins.simulate import files
-    from polyins.simulate.scenario import simulate as drive
+    from polyins.simulation import files
+    from polyins.simulation.scenario import simulate as drive
 
     say(f"configuration: {files.write(drive(scenario, seed=seed), out)}")
 
@@ -265,7 +269,9 @@ def convert(source: Path, target: Path) -> None:
     """Convert a data file; the formats follow from content (IN) and suffix (OUT)."""
     from polyins.io.convert import convert as convert_file
 
-    say(convert_file(source, target))
+    for text in convert_file(source, target):
+        say(f"warning: {text}")
+    say(f"written: {target}")
 
 
 @cli.command()

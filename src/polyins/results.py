@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from polyins.compare import Comparison
+from polyins.comparison import Comparison
 from polyins.io.files import write_bytes
 from polyins.io.solution_files import write_solution
 from polyins.recording import Recording

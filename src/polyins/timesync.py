@@ -73,7 +73,8 @@ def _common_time(streams: tuple[ImuStream, ...]) -> Array:
         spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
         raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
     base = streams[0].time
-    return base[(base >= begin) & (base <= end)]
+    common: Array = base[(base >= begin) & (base <= end)]
+    return common
 
 
 def _resample(stamps: Array, values: Array, time: Array) -> Array:

@@ -76,7 +76,9 @@ def residual_of_velocity(dx: Array, on_earth: bool) -> Array:
 
 
 def jacobian(residual: Callable[[Array, bool], Array], on_earth: bool) -> Array:
-    columns = [(residual(e, on_earth) - residual(-e, on_earth)) / (2.0 * h) for h, e in zip(STEPS, np.diag(STEPS), strict=True)]
+    columns = [
+        (residual(e, on_earth) - residual(-e, on_earth)) / (2.0 * h) for h, e in zip(STEPS, np.diag(STEPS), strict=True)
+    ]
     return np.stack(columns, axis=-1)
 
 

@@ -12,7 +12,7 @@ from written_recordings import as_increments, fixes, still_imu, write_config, wr
 
 from polyins.errors import InputError
 from polyins.io.inspect import inspect
-from polyins.load import load
+from polyins.loading import load
 
 QUICK = settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
 LINES = st.lists(st.text(st.sampled_from("0123456789.,;-+ e\tnaxyzt#%:\"'[]{}\n"), max_size=40), max_size=8)

@@ -13,7 +13,7 @@ from written_recordings import as_increments, fixes, still_imu, write_rows
 
 from polyins.errors import InputError
 from polyins.io import kf_gins
-from polyins.load import load
+from polyins.loading import load
 from polyins.recording import GnssStream, ImuStream
 from polyins.rig import DEG, HOUR
 

@@ -10,7 +10,7 @@ from written_recordings import as_increments, fixes, still_imu, write_recording,
 
 from polyins.errors import InputError
 from polyins.io.propose import propose
-from polyins.load import load
+from polyins.loading import load
 
 
 def save(folder: Path, text: str) -> Path:

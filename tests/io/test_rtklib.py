@@ -9,7 +9,7 @@ import pytest
 
 from polyins.errors import InputError
 from polyins.io.rtklib import read_gnss
-from polyins.load import load
+from polyins.loading import load
 from polyins.rig import DEG
 
 HEADER = """\

@@ -9,7 +9,7 @@ import pytest
 from synthetic_solutions import drifting, drive, reference, solution
 
 from polyins.errors import InputError
-from polyins.evaluate.errors import compare_to_reference
+from polyins.evaluation.errors import compare_to_reference
 from polyins.io.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution, written_beside
 
 COLUMNS = {

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from synthetic_solutions import drifting, drive, recording, reference
 
-from polyins.evaluate.summary import comparison, summarize
+from polyins.evaluation.summary import comparison, summarize
 from polyins.recording import Recording
 from polyins.report import write_report
 

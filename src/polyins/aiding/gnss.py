@@ -103,7 +103,7 @@ def velocity_residuals(blocks: Array, first: int, last: int, fix: Array, dt: flo
 
 @kernel
 def _keep_residual(w: Array, lane: int, rn: float, re: float, rd: float, m: Array) -> float:
-    weight = w[bank.WEIGHT + lane]
+    weight: float = w[bank.WEIGHT + lane]
     for a, value in enumerate((rn, re, rd)):
         w[bank.CORRECTION + a * LANES + lane] = value
         m[kalman.RESIDUAL + a] += weight * value

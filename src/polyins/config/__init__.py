@@ -16,7 +16,6 @@ from polyins.config.columns import (
 )
 from polyins.config.fields import Number, Pair, PerAxis, Positive, Section, Spread, Triple
 from polyins.config.file import Config, Filter, parse, validated
-from polyins.config.file import _explain as _explain
 from polyins.config.imu import NOISE_GRADES, ImuEntry, ImuSettings, InitialErrors, InitialStd, Noise
 from polyins.config.positions import GnssEntry, ReferenceEntry
 from polyins.config.timing import Outages, OutageSchedule, Start, StartPosition

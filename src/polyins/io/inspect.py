@@ -69,7 +69,7 @@ def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
 def _describe_configuration(path: str | Path) -> Facts:
     from polyins.io.kf_gins_configuration import recognizes
     from polyins.io.yaml_document import read_yaml
-    from polyins.load import load
+    from polyins.loading import load
 
     recording = load(path)
     gnss, reference = recording.gnss, recording.reference

@@ -114,7 +114,7 @@ def load_reference(path: str | Path, solution: Solution) -> Reference:
     time in common with the solution, or positions of the other kind (geodetic, local plane).
     """
     if data_format(path) == "configuration":
-        from polyins.load import load
+        from polyins.loading import load
 
         recording = load(path)
         if recording.reference is None:

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from polyins import __version__
 from polyins.errors import InputError
-from polyins.evaluate.attitude import euler_angles, euler_variance, quaternions
-from polyins.evaluate.local_level import displacement
-from polyins.evaluate.summary import plain
+from polyins.evaluation.attitude import euler_angles, euler_variance, quaternions
+from polyins.evaluation.local_level import displacement
+from polyins.evaluation.summary import plain
 from polyins.solution import Innovations, Solution
 
 if TYPE_CHECKING:

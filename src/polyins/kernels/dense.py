@@ -6,6 +6,7 @@ Kept as the yardstick of what the structured form of `share.predict` saves; both
 from __future__ import annotations
 
 import numpy as np
+
 from polyins.kernels import share
 from polyins.kernels.jit import Array, kernel
 from polyins.kernels.share import HALF, NAV, STATES, STRIDE, P

@@ -171,7 +171,7 @@ def correct_members(blocks: Array, first: int, last: int, metres: Array) -> None
 
 @kernel
 def _rotate(w: Array, lane: int) -> None:
-    """q = q(phi) q."""
+    """Q = q(phi) q."""
     x = w[bank.CORRECTION + 6 * LANES + lane]
     y = w[bank.CORRECTION + 7 * LANES + lane]
     z = w[bank.CORRECTION + 8 * LANES + lane]

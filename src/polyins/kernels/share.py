@@ -325,10 +325,7 @@ def _last_column(g: Array) -> None:
         for k in range(3):
             z += g[W + i * HALF + _G - SENSORS + k] * g[F + (_G + k) * HALF + last]
             z += g[W + i * HALF + _GS - SENSORS + k] * g[F + (_GS + k) * HALF + last]
-        if i == last:
-            n = own + 2.0 * z
-        else:
-            n = g[V + last * SENSORS + i] + (g[Z + last * SENSORS + i] + z)
+        n = own + 2.0 * z if i == last else g[V + last * SENSORS + i] + (g[Z + last * SENSORS + i] + z)
         g[P + i * STRIDE + last] = n
         g[P + last * STRIDE + i] = n
 

@@ -171,9 +171,11 @@ def advance_attitude(w: Array, dt: float) -> None:
         x, y, z = w[ROTATION + X + i], w[ROTATION + Y + i], w[ROTATION + Z + i]
         h = 0.25 * (x * x + y * y + z * z)
         c = 1.0 + h * (
-            C[1] + h * (C[2] + h * (C[3] + h * (C[4] + h * (C[5] + h * (C[6] + h * (C[7] + h * (C[8] + h * C[9]))))))))
+            C[1] + h * (C[2] + h * (C[3] + h * (C[4] + h * (C[5] + h * (C[6] + h * (C[7] + h * (C[8] + h * C[9])))))))
+        )
         s = 0.5 + h * (
-            S[1] + h * (S[2] + h * (S[3] + h * (S[4] + h * (S[5] + h * (S[6] + h * (S[7] + h * (S[8] + h * S[9]))))))))
+            S[1] + h * (S[2] + h * (S[3] + h * (S[4] + h * (S[5] + h * (S[6] + h * (S[7] + h * (S[8] + h * S[9])))))))
+        )
         bx, by, bz = s * x, s * y, s * z
         # n turns by less than 1e-6 rad: second order is beyond double precision
         nn = -0.5 * dt * (w[EARTH_RATE + i] + w[TRANSPORT_RATE + X + i])

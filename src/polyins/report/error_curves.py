@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluate.attitude import euler_angles, euler_variance
+from polyins.evaluation.attitude import euler_angles, euler_variance
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.palette import transparent
 from polyins.report.scene import Run, Scene

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from polyins import __version__
-from polyins.evaluate.summary import Document
+from polyins.evaluation.summary import Document
 from polyins.io.solution_files import written_beside
 from polyins.recording import Recording
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure

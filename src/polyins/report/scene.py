@@ -9,8 +9,8 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluate.errors import Errors, compare_to_reference
-from polyins.evaluate.summary import Document
+from polyins.evaluation.errors import Errors, compare_to_reference
+from polyins.evaluation.summary import Document
 from polyins.recording import Recording
 from polyins.report.palette import method_styles
 from polyins.solution import Solution

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from polyins.evaluate.summary import Document, plain
+from polyins.evaluation.summary import Document, plain
 from polyins.recording import Recording
 from polyins.report.scene import Run, Scene
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from polyins.compare import compare
-from polyins.evaluate.summary import figure
-from polyins.simulate.scenario import Errors, Fixes, Scenario, simulate
+from polyins.comparison import compare
+from polyins.evaluation.summary import figure
+from polyins.simulation.scenario import Errors, Fixes, Scenario, simulate
 
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
 SEEDS = 10

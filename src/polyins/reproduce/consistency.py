@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from polyins import batch
 from polyins.alignment import metric, rotation_matrix
-from polyins.evaluate.attitude import rotation_matrices
-from polyins.evaluate.consistency import nees, nees_bounds, share_inside
+from polyins.evaluation.attitude import rotation_matrices
+from polyins.evaluation.consistency import nees, nees_bounds, share_inside
 from polyins.kernels import share
 from polyins.recording import StartOptions
 from polyins.rig import DEG
-from polyins.simulate.path import Path, Truth
-from polyins.simulate.scenario import Board, Scenario, simulate_with_truth
+from polyins.simulation.path import Path, Truth
+from polyins.simulation.scenario import Board, Scenario, simulate_with_truth
 
 Array = NDArray[np.float64]
 
@@ -100,8 +100,7 @@ def navigation_errors(states: Array, truth: Truth) -> Array:
     from scipy.spatial.transform import Rotation
 
     position = [
-        (estimate - true) * metric(true, True)
-        for estimate, true in zip(states[:, 0:3], truth.position, strict=True)
+        (estimate - true) * metric(true, True) for estimate, true in zip(states[:, 0:3], truth.position, strict=True)
     ]
     turned = rotation_matrices(states[:, 6:10]) @ rotation_matrices(truth.quaternion).transpose(0, 2, 1)
     phi = -Rotation.from_matrix(turned).as_rotvec()

@@ -26,7 +26,7 @@ from polyins.config import parse
 from polyins.io.imu_stream import mount_rotation
 from polyins.io.position_stream import thinned
 from polyins.io.yaml_document import read_yaml
-from polyins.load import load
+from polyins.loading import load
 from polyins.rig import DEG, HOUR
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from polyins.errors import InputError
 from polyins.recording import GnssStream
-from polyins.simulate import earth
-from polyins.simulate.path import Path
+from polyins.simulation import earth
+from polyins.simulation.path import Path
 
 Array = NDArray[np.float64]
 

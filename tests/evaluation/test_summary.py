@@ -7,8 +7,8 @@ import pytest
 from synthetic_solutions import drifting, drive, innovations, moved, reference, solution
 
 import polyins
-from polyins.evaluate.attitude import quaternions
-from polyins.evaluate.summary import comparison, plain, summarize
+from polyins.evaluation.attitude import quaternions
+from polyins.evaluation.summary import comparison, plain, summarize
 
 KEYS = {
     "polyins", "method", "imus", "rate_hz", "duration_s", "epochs", "filter_s", "us_per_epoch", "first_call_s",

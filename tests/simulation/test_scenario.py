@@ -6,8 +6,8 @@ from ruamel.yaml import YAML
 
 from polyins.config import Noise, OutageSchedule
 from polyins.errors import InputError
-from polyins.simulate.increments import increments
-from polyins.simulate.scenario import (
+from polyins.simulation.increments import increments
+from polyins.simulation.scenario import (
     Board,
     Errors,
     Fixes,

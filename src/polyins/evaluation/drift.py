@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from polyins.evaluate.errors import Errors
+from polyins.evaluation.errors import Errors
 
 
 def drift(errors: Errors | None, step: float = 100.0) -> dict[str, float | None]:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from synthetic_solutions import drive, innovations, moved, no_innovations, reference, solution
 
-from polyins.evaluate.consistency import consistency, mean_nis, nees, nees_bounds, position_nees, share_inside
-from polyins.evaluate.errors import compare_to_reference
+from polyins.evaluation.consistency import consistency, mean_nis, nees, nees_bounds, position_nees, share_inside
+from polyins.evaluation.errors import compare_to_reference
 
 RUNS, INSTANTS, STATES = 40, 2000, 4
 

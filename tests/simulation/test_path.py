@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymap3d import ecef2ned, geodetic2ecef
 
-from polyins.evaluate.attitude import rotation_matrices
-from polyins.simulate import earth
-from polyins.simulate.path import LATERAL_LIMIT, SLOPE_LIMIT, TURN_RADIUS, drive, path, smooth_steps
+from polyins.evaluation.attitude import rotation_matrices
+from polyins.simulation import earth
+from polyins.simulation.path import LATERAL_LIMIT, SLOPE_LIMIT, TURN_RADIUS, drive, path, smooth_steps
 
 SEEDS = st.integers(0, 2**32 - 1)
 

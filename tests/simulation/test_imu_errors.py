@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from polyins.rig import NoiseGrade
-from polyins.simulate.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors, gauss_markov
+from polyins.simulation.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors, gauss_markov
 
 GRADE = NoiseGrade.from_datasheet(
     angle_random_walk_deg_sqrt_h=[0.2, 0.3, 0.4],

@@ -1,4 +1,4 @@
-"""A recording as files: one Parquet table per stream and the YAML configuration that `polyins.load` reads back.
+"""A recording as files: one Parquet table per stream and the YAML configuration that `polyins.loading` reads back.
 
 Increments are written as the recording holds them, in array axes; the configuration therefore has no mount rotations.
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluate.errors import Errors
+from polyins.evaluation.errors import Errors
 from polyins.solution import Innovations, Solution
 
 Array = NDArray[np.float64]

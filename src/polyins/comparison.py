@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from polyins import batch
-from polyins.evaluate.summary import comparison, summarize
+from polyins.evaluation.summary import comparison, summarize
 from polyins.methods import METHODS, find_method
 from polyins.recording import Recording
 from polyins.solution import Solution

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import __version__
-from polyins.evaluate.consistency import consistency
-from polyins.evaluate.drift import drift
-from polyins.evaluate.errors import Errors, compare_to_reference, rms
-from polyins.evaluate.outages import Interval, outage_statistic, partly_covered
+from polyins.evaluation.consistency import consistency
+from polyins.evaluation.drift import drift
+from polyins.evaluation.errors import Errors, compare_to_reference, rms
+from polyins.evaluation.outages import Interval, outage_statistic, partly_covered
 from polyins.recording import Reference
 from polyins.solution import Innovations, Solution
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polyins.evaluate.attitude import euler_jacobian, quaternions, rotation_matrices, wrap
+from polyins.evaluation.attitude import euler_jacobian, quaternions, rotation_matrices, wrap
 from polyins.rig import DEG
-from polyins.simulate import earth
+from polyins.simulation import earth
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -242,4 +242,3 @@ def _road(rng: np.random.Generator) -> tuple[float, float]:
 def _to_body(C_nb: Array, vector: Array) -> Array:
     """Return vectors of n, shape (T, 3), in b."""
     return np.asarray(np.einsum("tji,tj->ti", C_nb, vector))
-

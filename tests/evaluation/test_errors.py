@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from synthetic_solutions import RADIUS_M, drive, moved, reference, solution
 
 from polyins.errors import InputError
-from polyins.evaluate.attitude import quaternions
-from polyins.evaluate.errors import compare_to_reference
+from polyins.evaluation.attitude import quaternions
+from polyins.evaluation.errors import compare_to_reference
 
 metres = st.floats(-50.0, 50.0)
 

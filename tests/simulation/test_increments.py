@@ -6,10 +6,10 @@ from mechanization import mechanize
 from scipy.spatial.transform import Rotation
 from scipy.special import jv
 
-from polyins.evaluate.attitude import quaternions, rotation_matrices
-from polyins.simulate import earth
-from polyins.simulate.increments import increments
-from polyins.simulate.path import drive, path
+from polyins.evaluation.attitude import quaternions, rotation_matrices
+from polyins.simulation import earth
+from polyins.simulation.increments import increments
+from polyins.simulation.path import drive, path
 
 # interpreted, a mechanization of 1,000 s takes minutes
 DURATION = 100.0 if numba.config.DISABLE_JIT else 1000.0

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polyins.errors import InputError
-from polyins.evaluate.errors import Errors
-from polyins.evaluate.outages import outage_statistic, partly_covered, periodic
+from polyins.evaluation.errors import Errors
+from polyins.evaluation.outages import outage_statistic, partly_covered, periodic
 
 
 def errors_of(time: np.ndarray, north: np.ndarray, east: np.ndarray | float = 0.0) -> Errors:

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polyins.evaluate.attitude import (
+from polyins.evaluation.attitude import (
     angular_rate,
     euler_angles,
     euler_jacobian,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
-from polyins.evaluate.errors import ROUNDING_S, Errors, rms
+from polyins.evaluation.errors import ROUNDING_S, Errors, rms
 
 Interval = tuple[float, float]
 

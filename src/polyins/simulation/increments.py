@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polyins.simulate import earth
-from polyins.simulate.path import Path
+from polyins.simulation import earth
+from polyins.simulation.path import Path
 
 Array = NDArray[np.float64]
 

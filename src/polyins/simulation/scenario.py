@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from polyins.config import (
     Noise,
@@ -20,7 +20,7 @@ from polyins.config import (
     Spread,
     StartPosition,
     Triple,
-    _explain,
+    validated,
 )
 from polyins.errors import InputError
 from polyins.io.checks import axes_matrix
@@ -28,10 +28,10 @@ from polyins.io.imu_stream import noise_grade
 from polyins.io.yaml_document import read_yaml, write_yaml
 from polyins.recording import GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.rig import DEG, Imu, Rig
-from polyins.simulate import gnss
-from polyins.simulate.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors
-from polyins.simulate.increments import Increments, increments
-from polyins.simulate.path import Path, drive
+from polyins.simulation import gnss
+from polyins.simulation.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors
+from polyins.simulation.increments import Increments, increments
+from polyins.simulation.path import Path, drive
 
 Array = NDArray[np.float64]
 
@@ -211,11 +211,7 @@ def read_scenario(path: str | FilePath) -> Scenario:
 
     Raises InputError that names file, line and key of the first thing wrong.
     """
-    document = read_yaml(path)
-    try:
-        return Scenario.model_validate(document.values)
-    except ValidationError as error:
-        raise InputError(_explain(error.errors()[0], document)) from error
+    return validated(Scenario, read_yaml(path))
 
 
 def simulate(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Recording:

@@ -3,8 +3,8 @@ import pytest
 from pymap3d import geodetic2ned
 
 from polyins.errors import InputError
-from polyins.simulate.gnss import fixes, with_lies
-from polyins.simulate.path import drive
+from polyins.simulation.gnss import fixes, with_lies
+from polyins.simulation.path import drive
 
 DRIVE = drive(200.0, static=20.0, seed=1)
 ANTENNA = np.array([-0.3, 0.2, -1.0])

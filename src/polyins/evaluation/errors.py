@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
-from polyins.evaluate.attitude import angular_rate, euler_angles, rotation_matrices, wrap
-from polyins.evaluate.local_level import metres_per_unit
+from polyins.evaluation.attitude import angular_rate, euler_angles, rotation_matrices, wrap
+from polyins.evaluation.local_level import metres_per_unit
 from polyins.recording import Reference
 from polyins.rig import Vector
 from polyins.solution import Solution

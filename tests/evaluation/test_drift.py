@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from polyins.evaluate.drift import drift
-from polyins.evaluate.errors import Errors
+from polyins.evaluation.drift import drift
+from polyins.evaluation.errors import Errors
 
 
 def errors_of(distance: np.ndarray, horizontal: np.ndarray) -> Errors:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from polyins.io.table import read_track
-from polyins.load import load
+from polyins.loading import load
 from polyins.recording import FilterOptions, Reference, StartOptions
 from polyins.rig import ImuErrors
-from polyins.simulate.files import write, write_reference
-from polyins.simulate.scenario import Board, Fixes, Scenario, simulate
+from polyins.simulation.files import write, write_reference
+from polyins.simulation.scenario import Board, Fixes, Scenario, simulate
 
 SCENARIO = Scenario(
     name="round trip",
