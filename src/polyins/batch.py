@@ -139,7 +139,9 @@ def build_state(
     for i, member in enumerate(members):
         _fill_lane(blocks[i // LANES], i % LANES, member, start, c, metres, 1.0 / count)
     groups = np.zeros((len(spans) + (len(spans) > 1), share.SIZE))
+    groups[-1, share.WEIGHTS] = 1.0
     for g, (first, last) in zip(groups, spans, strict=False):
+        g[share.WEIGHTS] = (last - first) / count
         _fill_share(g, members[first:last], start, recording.rig)
     near = np.array([float(recording.geodetic), 0.0, 0.0, 1.0, recording.options.gravity])
     engine.move_near(near, start.position[0])

@@ -36,29 +36,41 @@ def project_to_origin(w: Array, dt: float) -> None:
 
 
 @kernel
-def _mean(blocks: Array, first: int, last: int, field: int, out: Array, to: int, count: int) -> None:
-    """Write the weighted means of `count` fields over lanes first ... last - 1, as offsets from the first lane's."""
-    weights = 0.0
-    for i in range(first, last):
-        weights += blocks[i // LANES, bank.WEIGHT + i % LANES]
+def _mean(blocks: Array, first: int, last: int, field: int, g: Array, to: int, count: int) -> None:
+    """Write the weighted means of `count` fields over lanes first ... last - 1, as offsets from the first lane's.
+
+    Members of a share begin with a block and have their blocks to themselves: lanes left over have weight 0.
+    """
+    for n in range(count * LANES):
+        g[share.LANE_SUMS + n] = 0.0
+    for b in range(first // LANES, (last + LANES - 1) // LANES):
+        w = blocks[b]
+        for f in range(count):
+            base = blocks[first // LANES, field + f * LANES]
+            for i in range(LANES):
+                g[share.LANE_SUMS + f * LANES + i] += w[bank.WEIGHT + i] * (w[field + f * LANES + i] - base)
     for f in range(count):
-        offset = field + f * LANES
-        base = blocks[first // LANES, offset + first % LANES]
         total = 0.0
-        for i in range(first, last):
-            block, lane = i // LANES, i % LANES
-            total += blocks[block, bank.WEIGHT + lane] * (blocks[block, offset + lane] - base)
-        out[to + f] = base + total / weights
+        for i in range(LANES):
+            total += g[share.LANE_SUMS + f * LANES + i]
+        g[to + f] = blocks[first // LANES, field + f * LANES] + total / g[share.WEIGHTS]
 
 
 @kernel
 def fuse_measurements(blocks: Array, first: int, last: int, g: Array, dt: float) -> None:
     """Write the mean rate and specific force of the members, paper A (14); axes are parallel by convention."""
-    _mean(blocks, first, last, bank.DTHETA, g, share.RATE, 3)
-    _mean(blocks, first, last, bank.DVEL, g, share.FORCE, 3)
+    if last - first == 1:
+        w, lane = blocks[first // LANES], first % LANES
+        for k in range(3):
+            g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane]
+            g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane]
+    else:
+        _mean(blocks, first, last, bank.DTHETA, g, share.RATE, 3)
+        _mean(blocks, first, last, bank.DVEL, g, share.FORCE, 3)
+    per_second = 1.0 / dt
     for k in range(3):
-        g[share.RATE + k] /= dt
-        g[share.FORCE + k] /= dt
+        g[share.RATE + k] *= per_second
+        g[share.FORCE + k] *= per_second
 
 
 @kernel

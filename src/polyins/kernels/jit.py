@@ -27,6 +27,7 @@ def _cache_folder() -> Path:
 
 
 CACHE_FOLDER = _cache_folder()
+NUMBA: Any = numba.config
 
 Array = npt.NDArray[Any]
 """An array as kernels take it: float64 unless said otherwise."""
@@ -35,12 +36,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _compiled(function: F, **options: Any) -> F:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE_FOLDER)
+    before = NUMBA.CACHE_DIR
+    NUMBA.CACHE_DIR = str(CACHE_FOLDER)
     try:
         return cast(F, numba.njit(error_model="numpy", nogil=True, fastmath={"contract"}, **options)(function))
     finally:
-        numba.config.CACHE_DIR = before
+        NUMBA.CACHE_DIR = before
 
 
 def kernel(function: F) -> F:
