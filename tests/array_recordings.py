@@ -126,10 +126,10 @@ def shaken_recording(
     equal: bool = False,
     spread: float = 0.4,
     truth: Path | None = None,
-    place: Array = np.array(START),
+    place: Array | None = None,
 ) -> Recording:
     """An array that is shaken from its start, with GNSS at the times of `fixes`; no velocities, no gate."""
-    truth = truth or shaken_path(duration, start=place)
+    truth = truth or shaken_path(duration, start=START if place is None else place)
     rig = board(count, seed, equal=equal, spread=spread)
     times = np.arange(0.4, duration, 0.4) if fixes is None else fixes
     gnss = received(truth, rig.antenna, times, seed)

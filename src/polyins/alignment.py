@@ -251,10 +251,7 @@ class _Search:
     def _gyro_biases(self, still: tuple[float, float], attitude: Array, position: Array) -> None:
         """Take what the gyros show at a standstill, less the earth's rate, as their biases."""
         rate, _, duration = self._mean(*still)
-        if self.recording.geodetic:
-            north, down = np.cos(position[0]), -np.sin(position[0])
-            earth_rate = earth.EARTH_RATE_RAD_S * np.array([north, 0.0, down])
-            rate = rate - rotation_matrix(attitude).T @ earth_rate
+        rate = rate - rotation_matrix(attitude).T @ earth_rate(position, self.recording.geodetic)
         self.errors[:, :3] += rate
         for i, imu in enumerate(self.recording.rig.imus):
             # white noise over the standstill, and a tenth of the grade for what the bias does afterwards
@@ -321,6 +318,13 @@ def metric(position: Array, geodetic: bool) -> Array:
     out = np.empty(3)
     earth.metric(np.asarray(position, dtype=float), geodetic, out)
     return out
+
+
+def earth_rate(position: Array, geodetic: bool) -> Array:
+    """Return the earth's angular rate, rad/s north, east, down, shape (3,); zero on a local plane."""
+    if not geodetic:
+        return np.zeros(3)
+    return earth.EARTH_RATE_RAD_S * np.array([np.cos(position[0]), 0.0, -np.sin(position[0])])
 
 
 def velocities_from_positions(gnss: GnssStream, geodetic: bool) -> GnssStream:

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from polyins import alignment, engine, timesync
 from polyins.alignment import Start
 from polyins.engine import Inputs, Outputs, Plan, State
+from polyins.errors import InputError
 from polyins.kernels import bank, dense, kalman, share
 from polyins.kernels.bank import LANES
 from polyins.methods import Method, find_method
 from polyins.recording import GnssStream, Recording
-from polyins.rig import Imu, Rig
+from polyins.rig import Imu, NoiseGrade, Rig
 from polyins.solution import Innovations, Solution
 from polyins.timesync import Aligned
 
@@ -98,6 +99,8 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     start = alignment.find_start(recording, aligned)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
+    if len(aligned.time) < 2:
+        raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")
     members = _members(row, recording.rig, start)
     plan, inputs = build_plan(row, recording, aligned), build_inputs(recording, aligned)
     return Prepared(
@@ -117,7 +120,7 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
 def _members(row: Method, rig: Rig, start: Start) -> list[Member]:
     if row.bank == "mean":
         # the papers give the virtual IMU the noise of one: then its gains are those of the other methods
-        virtual = Imu("mean", rig.imus[0].noise)
+        virtual = Imu("mean", NoiseGrade.typical([imu.noise for imu in rig.imus]))
         std = np.sqrt((start.imu_error_std**2).mean(axis=0))
         return [Member(virtual, start.imu_errors.mean(axis=0), std, np.zeros(3), rig.antenna)]
     return [
@@ -134,10 +137,11 @@ def build_state(
     spans = [(0, count)] if row.shares == "all" else [(i, i + 1) for i in range(count)]
     blocks = np.zeros(((count + LANES - 1) // LANES, bank.SIZE))
     blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
-    c = alignment.rotation_matrix(start.attitude)
-    metres = alignment.metric(start.position, recording.geodetic)
+    interval = inputs.time[1] - inputs.time[0]
     for i, member in enumerate(members):
-        _fill_lane(blocks[i // LANES], i % LANES, member, start, c, metres, 1.0 / count)
+        rate = (inputs.increments[0, :3, i] / interval - member.start_errors[:3]) / (1.0 + member.start_errors[6:9])
+        _fill_lane(blocks[i // LANES], i % LANES, member, start, rate, recording.geodetic)
+        blocks[i // LANES, bank.WEIGHT + i % LANES] = 1.0 / count
     groups = np.zeros((len(spans) + (len(spans) > 1), share.SIZE))
     groups[-1, share.WEIGHTS] = 1.0
     for g, (first, last) in zip(groups, spans, strict=False):
@@ -145,7 +149,6 @@ def build_state(
         _fill_share(g, members[first:last], start, recording.rig)
     near = np.array([float(recording.geodetic), 0.0, 0.0, 1.0, recording.options.gravity])
     engine.move_near(near, start.position[0])
-    interval = inputs.time[1] - inputs.time[0]
     state = State(
         blocks=blocks,
         groups=groups,
@@ -160,40 +163,35 @@ def build_state(
     return state
 
 
-def _fill_lane(w: Array, lane: int, member: Member, start: Start, c: Array, metres: Array, weight: float) -> None:
+def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, geodetic: bool) -> None:
+    """Put a member where it is mounted, moving as the turning array does: `rate` is its own, rad/s."""
     from scipy.spatial.transform import Rotation
 
     def put(field: int, values: Array) -> None:
         w[field + lane : field + lane + len(values) * LANES : LANES] = values
 
-    put(bank.POSITION, start.position - c @ member.to_origin / metres)
-    put(bank.VELOCITY, start.velocity)
+    c = alignment.rotation_matrix(start.attitude)
+    lever_arm = c @ -member.to_origin
+    turning = c @ rate - alignment.earth_rate(start.position, geodetic)
+    put(bank.POSITION, start.position + lever_arm / alignment.metric(start.position, geodetic))
+    put(bank.VELOCITY, start.velocity + np.cross(turning, lever_arm))
     put(bank.QUATERNION, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
     put(bank.ERRORS, member.start_errors)
     put(bank.TO_ORIGIN, member.to_origin)
     put(bank.TO_ANTENNA, member.to_antenna)
-    put(bank.WEIGHT, np.array([weight]))
 
 
 def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None:
     """Give a share the noise of its mean member."""
-    noises = [member.imu.noise for member in members]
+    noise = NoiseGrade.typical([member.imu.noise for member in members])
     std = np.sqrt(np.mean([member.start_error_std**2 for member in members], axis=0))
     variances = np.concatenate([start.position_std, start.velocity_std, start.attitude_std, std]) ** 2
     for i, variance in enumerate(variances):
         g[share.P + i * (share.STRIDE + 1)] = variance
-    steady = np.mean(
-        [
-            np.concatenate([n.gyro_bias_std, n.accel_bias_std, n.gyro_scale_std, n.accel_scale_std]) ** 2
-            / n.correlation_time
-            for n in noises
-        ],
-        axis=0,
-    )
-    g[share.ERROR_PSD : share.ERROR_PSD + 12] = 2.0 * steady
-    g[share.DECAY : share.DECAY + 12] = np.mean([1.0 / n.correlation_time for n in noises])
-    g[share.GYRO_PSD : share.GYRO_PSD + 3] = np.mean([n.angle_random_walk**2 for n in noises], axis=0)
-    g[share.ACCEL_PSD : share.ACCEL_PSD + 3] = np.mean([n.velocity_random_walk**2 for n in noises], axis=0)
+    g[share.ERROR_PSD : share.ERROR_PSD + 12] = 2.0 * noise.steady_std() ** 2 / noise.correlation_time
+    g[share.DECAY : share.DECAY + 12] = 1.0 / noise.correlation_time
+    g[share.GYRO_PSD : share.GYRO_PSD + 3] = noise.angle_random_walk**2
+    g[share.ACCEL_PSD : share.ACCEL_PSD + 3] = noise.velocity_random_walk**2
     g[share.ANTENNA : share.ANTENNA + 3] = members[0].to_antenna if len(members) == 1 else rig.antenna
 
 

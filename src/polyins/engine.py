@@ -39,7 +39,7 @@ class State(NamedTuple):
     near: Array
     """geodetic, latitude, its sine and cosine, plane gravity; see `earth.evaluate`"""
     before: Array
-    """previous mean rate and a flag that it exists; see `fuse.average_increments`"""
+    """previous mean rate and the length of its interval; see `fuse.average_increments`"""
     clock: Array
     """time of the state, s; length of the last interval, s"""
     counters: Array
@@ -190,8 +190,8 @@ def aid_by_velocity(state: State, plan: Plan, fix: Array) -> bool:
     nis = 0.0
     for s in range(state.members.shape[0]):
         g, m = state.groups[s], state.measurements[s]
-        w = state.blocks[state.members[s, 0] // LANES]
-        gnss.velocity_design(g, m, w[bank.EARTH_RATE], w[bank.EARTH_RATE + LANES])
+        w, lane = state.blocks[state.members[s, 0] // LANES], state.members[s, 0] % LANES
+        gnss.velocity_design(g, m, w[bank.EARTH_RATE + lane], w[bank.EARTH_RATE + LANES + lane])
         gnss.velocity_residuals(state.blocks, state.members[s, 0], state.members[s, 1], fix, state.clock[1], m)
         for a in range(3):
             m[kalman.R + a] = fix[9 + a]
@@ -350,7 +350,9 @@ def run_epochs(
     blocks, groups, members, near, clock = state.blocks, state.groups, state.members, state.near, state.clock
     time, increments, fix_time, counters = inputs.time, inputs.increments, inputs.fix_time, state.counters
     states, variances = outputs.states, outputs.variances
-    virtual, shared, snap = plan.virtual, plan.shared_mechanization, plan.gnss_snap
+    virtual, snap = plan.virtual, plan.gnss_snap
+    # one IMU shares with nobody: its fused state is its own, at its own place
+    shared = plan.shared_mechanization and members[0, 1] - members[0, 0] > 1
     next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
     for k in range(first, last):
         now, end = time[k - 1], time[k]

@@ -5,7 +5,7 @@ Everything is SI inside. Datasheet units (deg/h, mGal, ppm, deg/sqrt(h)) appear 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -89,6 +89,29 @@ class NoiseGrade:
         )
 
 
+    def steady_std(self) -> NDArray[np.float64]:
+        """Return the standard deviations of the twelve slow errors in the order of the filter's states, (12,)."""
+        return np.concatenate([self.gyro_bias_std, self.accel_bias_std, self.gyro_scale_std, self.accel_scale_std])
+
+    @classmethod
+    def typical(cls, grades: Sequence[NoiseGrade]) -> NoiseGrade:
+        """Return the grade that stands for several: the means of what drives and what damps their errors."""
+        damping = np.array([1.0 / grade.correlation_time for grade in grades])
+
+        def rms(values: list[Vector], weights: NDArray[np.float64] | None = None) -> Vector:
+            return np.asarray(np.sqrt(np.average(np.square(values), axis=0, weights=weights)))
+
+        return cls(
+            rms([grade.angle_random_walk for grade in grades]),
+            rms([grade.velocity_random_walk for grade in grades]),
+            rms([grade.gyro_bias_std for grade in grades], damping),
+            rms([grade.accel_bias_std for grade in grades], damping),
+            rms([grade.gyro_scale_std for grade in grades], damping),
+            rms([grade.accel_scale_std for grade in grades], damping),
+            float(1.0 / damping.mean()),
+        )
+
+
 @dataclass(frozen=True)
 class ImuErrors:
     """What is known of the twelve slow errors of one IMU at the start, in array axes, shape (3,) each."""
@@ -130,8 +153,7 @@ class Imu:
         """Return the initial standard deviation of the twelve errors, shape (12,)."""
         if self.initial_std is not None:
             return self.initial_std.as_array()
-        n = self.noise
-        return np.concatenate([n.gyro_bias_std, n.accel_bias_std, n.gyro_scale_std, n.accel_scale_std])
+        return self.noise.steady_std()
 
 
 @dataclass(frozen=True)

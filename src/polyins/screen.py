@@ -53,12 +53,15 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    console = Console(soft_wrap=False)
+    if not console.is_terminal:
+        console.width = NARROWEST
     table = Table(title=title, title_justify="left")
     for number, column in enumerate(columns):
-        table.add_column(column, justify="right" if number else "left")
+        table.add_column(column, justify="right" if number else "left", no_wrap=True)
     for row in rows:
         table.add_row(*row)
-    Console().print(table)
+    console.print(table)
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -66,14 +69,17 @@ def number(value: float | None, digits: int = 2) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
+NARROWEST = 116
+"""columns of text that a table is given where the output is no terminal"""
+
 FIGURES = (
-    ("outages rms of max, m", ("outages", "horizontal_max_rms_m"), 2),
-    ("horizontal rms, m", ("reference", "horizontal_rms_m"), 2),
-    ("vertical rms, m", ("reference", "vertical_rms_m"), 2),
-    ("roll, deg", ("reference", "roll_rmse_deg"), 3),
-    ("pitch, deg", ("reference", "pitch_rmse_deg"), 3),
-    ("heading, deg", ("reference", "heading_rmse_deg"), 3),
-    ("us/epoch", ("us_per_epoch",), 2),
+    ("outages\nmax, m", ("outages", "horizontal_max_rms_m"), 2),
+    ("horizontal\nrms, m", ("reference", "horizontal_rms_m"), 2),
+    ("vertical\nrms, m", ("reference", "vertical_rms_m"), 2),
+    ("roll\ndeg", ("reference", "roll_rmse_deg"), 3),
+    ("pitch\ndeg", ("reference", "pitch_rmse_deg"), 3),
+    ("heading\ndeg", ("reference", "heading_rmse_deg"), 3),
+    ("CPU us\nper epoch", ("us_per_epoch",), 2),
 )
 
 
@@ -90,7 +96,7 @@ def print_summaries(title: str, summaries: Mapping[str, Mapping[str, Any]], rati
         if ratios:
             row.append("1" if name == "single" else number(ratios.get(name), 2))
         rows.append(row)
-    columns = ["method", *(label for label, _, _ in FIGURES)] + (["ratio to single"] if ratios else [])
+    columns = ["method", *(label for label, _, _ in FIGURES)] + (["ratio to\nsingle"] if ratios else [])
     print_table(title, columns, rows)
     for text in dict.fromkeys(text for summary in summaries.values() for text in summary["warnings"]):
         say(f"warning: {text}")

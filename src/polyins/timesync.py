@@ -59,8 +59,9 @@ def align(streams: tuple[ImuStream, ...]) -> Aligned:
         for begin, end in gaps:
             missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
         if gaps:
-            longest = max(end - begin for begin, end in gaps)
-            warnings.append(f"IMU {stream.name}: {len(gaps)} gaps, the longest {longest:.3f} s at {gaps[0][0]:.3f} s")
+            begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
+            count = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
+            warnings.append(f"IMU {stream.name}: {count} of {end - begin:.3f} s at {begin:.3f} s")
     if missing.any():
         _bridge(time, increments, missing)
     return Aligned(time, increments, tuple(warnings))

@@ -33,6 +33,13 @@ def around(place: State, spread: float, seed: int) -> list[State]:
     ]
 
 
+def empty_group(weights: float) -> Array:
+    """A share, or the merged state, whose members' weights add up to so much."""
+    g = np.zeros(share.SIZE)
+    g[share.WEIGHTS] = weights
+    return g
+
+
 def bank_of(states: list[State]) -> Array:
     w = block()
     put(w, bank.POSITION, np.array([s.position for s in states]))
@@ -72,7 +79,7 @@ def test_the_mean_attitude_lies_between_its_members_at_any_heading_and_pitch(hea
     pairs = Rotation.concatenate([Rotation.from_rotvec(apart) * middle] * 2)
     quaternions = pairs.as_quat(scalar_first=True)
     quaternions *= np.sign(quaternions @ middle.as_quat(scalar_first=True))[:, None]
-    w, g = block(), np.zeros(share.SIZE)
+    w, g = block(), empty_group(1.0)
     put(w, bank.QUATERNION, quaternions)
     fuse.fuse_states(w[None], 0, LANES, g)
     merged = Rotation.from_matrix(g[share.MATRIX : share.MATRIX + 9].reshape(3, 3))
@@ -81,20 +88,31 @@ def test_the_mean_attitude_lies_between_its_members_at_any_heading_and_pitch(hea
 
 
 def test_means_run_over_the_lanes_of_a_share_across_blocks() -> None:
+    """Eleven of sixteen lanes; whatever stands in those without an IMU has no weight."""
     rng = np.random.default_rng(3)
-    blocks, g = np.array([block(), block()]), np.zeros(share.SIZE)
+    blocks, g = np.array([block(), block()]), empty_group(11.0 / 20.0)
     positions = np.array([0.5, 2.0, 30.0]) + 1e-7 * rng.standard_normal((16, 3))
     velocities = rng.standard_normal((16, 3))
+    velocities[11:] = 1e6
+    weights = np.where(np.arange(16) < 11, 1.0 / 20.0, 0.0)[:, None]
     for b, w in enumerate(blocks):
-        put(w, bank.ORIGIN_POSITION, positions[8 * b : 8 * b + 8])
-        put(w, bank.ORIGIN_VELOCITY, velocities[8 * b : 8 * b + 8])
-    fuse.fuse_states(blocks, 6, 11, g)
-    np.testing.assert_allclose(g[share.POSITION : share.POSITION + 3], positions[6:11].mean(axis=0), rtol=1e-15)
-    np.testing.assert_allclose(g[share.VELOCITY : share.VELOCITY + 3], velocities[6:11].mean(axis=0), atol=1e-15)
+        lanes = slice(LANES * b, LANES * b + LANES)
+        put(w, bank.WEIGHT, weights[lanes])
+        put(w, bank.ORIGIN_POSITION, positions[lanes])
+        put(w, bank.ORIGIN_VELOCITY, velocities[lanes])
+        put(w, bank.DTHETA, 0.01 * velocities[lanes])
+        put(w, bank.DVEL, -0.01 * velocities[lanes])
+    fuse.fuse_states(blocks, 0, 11, g)
+    fuse.fuse_measurements(blocks, 0, 11, g, 0.005)
+    mean = velocities[:11].mean(axis=0)
+    np.testing.assert_allclose(g[share.POSITION : share.POSITION + 3], positions[:11].mean(axis=0), rtol=1e-15)
+    np.testing.assert_allclose(g[share.VELOCITY : share.VELOCITY + 3], mean, atol=1e-14)
+    np.testing.assert_allclose(g[share.RATE : share.RATE + 3], 2.0 * mean, atol=1e-14)
+    np.testing.assert_allclose(g[share.FORCE : share.FORCE + 3], -2.0 * mean, atol=1e-14)
 
 
 def test_one_imu_is_itself_at_its_own_place() -> None:
-    w, g = block(Rotation.from_euler("ZYX", [170.0, 60.0, 5.0], degrees=True), (0.5, 2.0, 30.0)), np.zeros(share.SIZE)
+    w, g = block(Rotation.from_euler("ZYX", [170.0, 60.0, 5.0], degrees=True), (0.5, 2.0, 30.0)), empty_group(0.125)
     w[bank.ORIGIN_POSITION : bank.ORIGIN_POSITION + 6 * LANES] = np.nan
     fuse.fuse_states(w[None], 3, 4, g)
     np.testing.assert_array_equal(g[share.POSITION : share.POSITION + 3], [0.5, 2.0, 30.0])
@@ -103,8 +121,8 @@ def test_one_imu_is_itself_at_its_own_place() -> None:
 
 def test_equal_members_average_to_themselves_exactly() -> None:
     """Three thirds do not add up to one in binary; a mean of offsets does not need them to."""
-    w, g = block(), np.zeros(share.SIZE)
-    put(w, bank.WEIGHT, [1.0 / 3.0])
+    w, g = block(), empty_group(1.0)
+    put(w, bank.WEIGHT, np.where(np.arange(LANES) < 3, 1.0 / 3.0, 0.0)[:, None])
     put(w, bank.ORIGIN_POSITION, [0.1, 2.3, 31.7])
     fuse.fuse_states(w[None], 0, 3, g)
     np.testing.assert_array_equal(g[share.POSITION : share.POSITION + 3], [0.1, 2.3, 31.7])

@@ -146,8 +146,8 @@ def average_increments(raw: Array, dt: float, to_origin: Array, before: Array, b
     """Write the increments of one virtual IMU at the array origin into lane 0, paper A (12)-(14).
 
     `raw` is (6, N). `to_origin` is the mean vector from the IMUs to the origin; with the mean angular rate for all,
-    f + w x (w x l) + dw/dt x l depends on no other lever arm. `before` holds the previous mean rate and a flag that
-    it exists; both are updated.
+    f + w x (w x l) + dw/dt x l depends on no other lever arm; dw is between the middles of two intervals. `before`
+    holds the previous mean rate and the length of its interval, 0 if there is none; both are updated.
     """
     count = raw.shape[1]
     for k in range(6):
@@ -159,12 +159,13 @@ def average_increments(raw: Array, dt: float, to_origin: Array, before: Array, b
     y = blocks[0, bank.RAW_DTHETA + LANES] / dt
     z = blocks[0, bank.RAW_DTHETA + 2 * LANES] / dt
     lx, ly, lz = to_origin[0], to_origin[1], to_origin[2]
-    ax, ay, az = (x - before[0]) * before[3], (y - before[1]) * before[3], (z - before[2]) * before[3]
+    share_of_change = 2.0 * dt / (before[3] + dt) if before[3] > 0.0 else 0.0
+    ax, ay, az = (x - before[0]) * share_of_change, (y - before[1]) * share_of_change, (z - before[2]) * share_of_change
     sx, sy, sz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
     blocks[0, bank.RAW_DVEL] += (y * sz - z * sy) * dt + (ay * lz - az * ly)
     blocks[0, bank.RAW_DVEL + LANES] += (z * sx - x * sz) * dt + (az * lx - ax * lz)
     blocks[0, bank.RAW_DVEL + 2 * LANES] += (x * sy - y * sx) * dt + (ax * ly - ay * lx)
-    before[0], before[1], before[2], before[3] = x, y, z, 1.0
+    before[0], before[1], before[2], before[3] = x, y, z, dt
 
 
 @kernel

@@ -91,8 +91,8 @@ def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: floa
 
     g[BY_N + 0] = -vd * m * dt
     g[BY_D + 0] = vn * m * dt
-    g[BY_N + 1] = ve * t * m * dt
-    g[BY_E + 1] = -(vd * n + vn * t * m) * dt
+    g[BY_N + 1] = ve * t * n * dt
+    g[BY_E + 1] = -(vd + vn * t) * n * dt
     g[BY_D + 1] = ve * n * dt
 
     g[BY_N + 3] = -(2.0 * ve * wn + ve * ve * n * sec2) * m * dt
