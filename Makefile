@@ -17,7 +17,7 @@ demo: $(BIN)/polyins
 	$(BIN)/polyins demo
 
 test: $(BIN)/pytest
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses 2 --dist worksteal
 
 lint: $(BIN)/pytest
 	$(BIN)/ruff check src tests

@@ -102,7 +102,7 @@ def random_state(rng: np.random.Generator, earth: Earth) -> State:
     return State(position, rng.uniform(-200.0, 200.0, 3), quaternion)
 
 
-EARTHS = {"wgs84": Ellipsoid(), "plane": FlatEarth()}
+EARTHS: dict[str, Earth] = {"wgs84": Ellipsoid(), "plane": FlatEarth()}
 
 
 def near_of(earth: Earth, latitude: float) -> Array:

@@ -1,0 +1,9 @@
+"""The covariance of a single filter fits its errors."""
+
+from polyins.reproduce import consistency
+
+
+def test_nees_lies_inside_its_bounds() -> None:
+    figures = consistency.reproduce()["polyins"]
+    assert figures["share_inside_95_percent"] >= 0.90
+    assert abs(figures["mean_nees"] - consistency.STATES) < 0.05 * consistency.STATES
