@@ -624,7 +624,6 @@ def run(
     earth: Earth | None = None,
     gnss_snap: float = 1e-3,
     rescale_coning: bool = True,
-    average_noise: bool = True,
 ) -> dict[str, Any]:
     """Navigate with one of `METHODS`.
 
@@ -633,8 +632,7 @@ def run(
     second's). positions (N, 3) and antenna (3,) in the array frame. start: at the array origin, or one per IMU, or with
     one IMU that IMU's. start_std (21,) in the order of the error states. Fixes at or before time[0] are left out.
 
-    IMU-Fusion has one virtual IMU at the array origin, its noise and the start std of its twelve errors 1/sqrt(N) of
-    those given, unless `average_noise` is False.
+    IMU-Fusion has one virtual IMU at the array origin, with the noise of one IMU as in the paper.
 
     Returns time (T,), fused position, velocity (T, 3), quaternion (T, 4); of each navigator imu_position, imu_velocity
     (T, N, 3), imu_quaternion (T, N, 4), errors (T, N, 12); variance (T, M, 21) of the M covariances and the last
@@ -642,12 +640,8 @@ def run(
     """
     earth = earth or Ellipsoid()
     if method == "imu-fusion":
-        count = dtheta.shape[1]
         mean_dtheta, mean_dvel = virtual_imu(time, dtheta, dvel, positions)
         dtheta, dvel, positions = mean_dtheta[:, None], mean_dvel[:, None], np.zeros((1, 3))
-        if average_noise:
-            noise = noise.averaged(count)
-            start_std = np.concatenate([start_std[:9], start_std[9:] / np.sqrt(count)])
         if not isinstance(start, State):
             raise ValueError("imu-fusion starts at the array origin: one state, not one per IMU")
     if method == "single" and dtheta.shape[1] != 1:

@@ -60,7 +60,7 @@ def drive(duration: float = 60.0, rate: float = 20.0, begin: float = 1000.0, rol
 
 
 def no_innovations() -> Innovations:
-    return Innovations(*[np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)], *[np.zeros(0, bool)] * 2)
+    return Innovations(*[np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)], *[np.zeros(0, bool)] * 3)
 
 
 def solution(truth: Drive, geodetic: bool = True, imus: int = 1, method: str = "single", **changes: object) -> Solution:
@@ -105,7 +105,7 @@ def innovations(time: np.ndarray, seed: int, rejected: tuple[int, ...] = ()) -> 
     accepted = np.ones(time.size, bool)
     accepted[list(rejected)] = False
     nis = np.sum((residual / std) ** 2, axis=1)
-    return Innovations(time, residual, std, nis, accepted, np.zeros(time.size, bool))
+    return Innovations(time, residual, std, nis, accepted, *[np.zeros(time.size, bool)] * 2)
 
 
 def drifting(truth: Drive, method: str, imus: int, scale: float, outages: tuple, seed: int) -> Solution:

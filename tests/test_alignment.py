@@ -156,9 +156,7 @@ def test_the_std_of_a_gyro_bias_shrinks_with_the_length_of_the_standstill() -> N
 
 def test_gyro_biases_are_left_alone_on_request() -> None:
     imu = standing(Rotation.identity(), 12.0, bias=np.full(6, 1e-3))
-    options = StartOptions(
-        heading=0.0, position=PLACE, static_interval=(0.0, 10.0), estimate_gyro_bias=False
-    )
+    options = StartOptions(heading=0.0, position=PLACE, static_interval=(0.0, 10.0), estimate_gyro_bias=False)
     start = found(Recording(rig(), (imu,), start=options))
     np.testing.assert_array_equal(start.imu_errors, 0.0)
     np.testing.assert_array_equal(start.imu_error_std[0], rig().imus[0].start_std())

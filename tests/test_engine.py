@@ -155,7 +155,6 @@ def by_the_reference(recording: Recording, method: str, velocity_of: int, veloci
         noise,
         earth=earth,
         gnss_snap=recording.options.gnss_snap,
-        average_noise=False,
     )
 
 

@@ -509,7 +509,7 @@ def test_identical_imus_at_one_place_navigate_like_one(method: str) -> None:
     one = run_single(TIME, dtheta[:, 0], dvel[:, 0], arm, FIXES, HOME, START_STD, NOISE)
     three = np.repeat(dtheta, 3, axis=1), np.repeat(dvel, 3, axis=1)
     many = run(
-        method, TIME, *three, np.zeros((3, 3)), arm, FIXES, HOME, START_STD, NOISE, average_noise=False
+        method, TIME, *three, np.zeros((3, 3)), arm, FIXES, HOME, START_STD, NOISE
     )  # fmt: skip
     assert_same(many, one, 1e-12)
     deviation = np.abs(many["errors"] - one["errors"][:, None]) / np.sqrt(one["variance"][:, None, 9:])
@@ -527,13 +527,6 @@ def test_an_array_of_one_is_the_single_imu_to_the_last_bit(method: str) -> None:
     for name in ("position", "velocity", "quaternion", "innovation_time"):
         np.testing.assert_array_equal(array[name], one[name])
     np.testing.assert_array_equal(array["variance"][:, 0], one["variance"])
-
-
-def test_a_virtual_imu_of_n_is_sqrt_n_better() -> None:
-    dtheta, dvel = noisy(TIME, seed=3, imus=4)
-    result = run("imu-fusion", TIME, dtheta, dvel, POSITIONS, ANTENNA, [], HOME, START_STD, NOISE)
-    np.testing.assert_allclose(np.sqrt(result["variance"][0, 0, 9:]), IMU_STD / 2.0)
-    np.testing.assert_allclose(np.sqrt(result["variance"][-1, 0, 9:]), IMU_STD / 2.0, rtol=1e-6)
 
 
 def test_each_imu_learns_its_own_biases_from_the_common_gain() -> None:

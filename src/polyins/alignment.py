@@ -20,6 +20,7 @@ STILL_RATE = 0.4 * DEG  # rad/s, of the averaged gyro within a window
 STILL_FORCE = 0.10  # m/s^2
 SHORTEST_STANDSTILL = 3.0  # s
 LONGEST_STANDSTILL = 60.0  # s
+LEAST_LEFT = 1.0  # s, of data after the start
 COURSE_SPEED = 1.5  # m/s: slower than this the direction of motion is no heading
 
 
@@ -65,6 +66,9 @@ class _Search:
         self.errors = np.array([imu.initial_errors.as_array() for imu in recording.rig.imus])
         self.error_std = np.array([imu.start_std() for imu in recording.rig.imus])
         self.fixes = velocities_from_positions(recording.gnss, recording.geodetic) if recording.gnss else None
+        # differences at the first two fixes are one-sided, in velocity or in the acceleration that follows from it
+        given = recording.gnss is not None and recording.gnss.velocity is not None
+        self.first_moving = 0 if given else 2
 
     def run(self) -> Start:
         still = self._standstill()
@@ -114,14 +118,14 @@ class _Search:
         if self.options.time is not None:
             wanted, self.sources["time"] = self.options.time, "given"
         elif still:
-            wanted, self.sources["time"] = still[1], "end of the standstill"
+            wanted, self.sources["time"] = min(still[1], last - LEAST_LEFT), "end of the standstill"
         elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
             wanted, self.sources["time"] = self._moving(first), "first fix in motion"
         elif self.fixes is not None and self.options.position is None:
             wanted, self.sources["time"] = max(first, float(self.fixes.time[0])), "first fix"
         else:
             wanted, self.sources["time"] = first, "first epoch"
-        if not first <= wanted <= last - 1.0:
+        if not first <= wanted <= last - LEAST_LEFT:
             raise InputError(
                 f"start: time {wanted:.3f} s; expected within the IMU data, {first:.3f} to {last:.3f} s,"
                 " with at least a second left"
@@ -134,6 +138,7 @@ class _Search:
         assert self.fixes.velocity is not None
         speed = np.hypot(self.fixes.velocity[:, 0], self.fixes.velocity[:, 1])
         moving = np.flatnonzero((speed > COURSE_SPEED) & (self.fixes.time >= after))
+        moving = moving[moving >= self.first_moving]
         if len(moving) == 0:
             raise InputError(
                 f"start: no heading: GNSS never moves faster than {COURSE_SPEED} m/s; expected start.heading_deg"
@@ -244,7 +249,9 @@ class _Search:
             return np.zeros(3), np.full(3, 0.01)
         self.sources["position"] = "GNSS"
         nearest = int(np.argmin(np.abs(gnss.time - time)))
-        antenna = _interpolate(time, gnss.time, gnss.position)
+        antenna = gnss.position[nearest] + _interpolate(
+            time, gnss.time, _from(gnss.position[nearest], gnss.position, self.recording.geodetic)
+        )
         shift = rotation_matrix(attitude) @ self.recording.rig.antenna
         return antenna - shift / metric(antenna, self.recording.geodetic), gnss.position_std[nearest]
 
@@ -327,16 +334,29 @@ def earth_rate(position: Array, geodetic: bool) -> Array:
     return earth.EARTH_RATE_RAD_S * np.array([np.cos(position[0]), 0.0, -np.sin(position[0])])
 
 
-def velocities_from_positions(gnss: GnssStream, geodetic: bool) -> GnssStream:
-    """Return the stream with velocities differenced from positions where the receiver gives none."""
-    if gnss.velocity is not None or len(gnss.time) < 2:
+def velocities_from_positions(gnss: GnssStream, geodetic: bool) -> GnssStream | None:
+    """Return the stream with velocities, differenced from positions where the receiver gives none.
+
+    A single fix has none: None.
+    """
+    if gnss.velocity is not None:
         return gnss
+    if len(gnss.time) < 2:
+        return None
     return replace(gnss, velocity=_differences(gnss.time, gnss.position, geodetic))
 
 
 def _differences(time: Array, position: Array, geodetic: bool) -> Array:
-    metres = (position - position[0]) * metric(position[0], geodetic)
+    metres = _from(position[0], position, geodetic) * metric(position[0], geodetic)
     return np.asarray(np.gradient(metres, time, axis=0))
+
+
+def _from(origin: Array, position: Array, geodetic: bool) -> Array:
+    """Return coordinates relative to `origin`, longitudes the shorter way round."""
+    relative = position - origin
+    if geodetic:
+        relative[:, 1] = (relative[:, 1] + np.pi) % (2.0 * np.pi) - np.pi
+    return np.asarray(relative)
 
 
 def _interpolate(at: float, time: Array, values: Array) -> Array:

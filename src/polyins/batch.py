@@ -94,6 +94,8 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     """Lay a run out, as `run` does before its first epoch."""
     row = find_method(method)
     if row.bank == "one":
+        if not 0 <= imu < len(recording.imus):
+            raise InputError(f"imu: {imu} is not an index of {len(recording.imus)} IMUs; they count from 0")
         recording = recording.subset([imu])
     aligned = timesync.align(recording.imus)
     start = alignment.find_start(recording, aligned)
@@ -273,6 +275,7 @@ def _solution(run: Prepared, filter_s: float, first_call_s: float) -> Solution:
             nis=outputs.innovations[:, 6],
             accepted=(status & 3) != engine.REJECTED,
             reopened=(status & 3) == engine.REOPENED,
+            velocity_rejected=status >= engine.VELOCITY_REJECTED,
         ),
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,

@@ -294,6 +294,7 @@ def begin(state: State, plan: Plan, raw: Array, interval: float) -> None:
         strapdown.remember(w)
     for s in range(state.members.shape[0]):
         fuse.fuse_measurements(state.blocks, state.members[s, 0], state.members[s, 1], state.groups[s], interval)
+    _gather_idle_lanes(state.blocks, state.members[-1, 1])
     merge(state.blocks, state.groups, state.members, state.clock[1])
 
 
@@ -331,6 +332,15 @@ def _log(state: State, outputs: Outputs, time: float) -> None:
             for k in range(12):
                 outputs.log[row, 0, k, i] = state.blocks[i // LANES, bank.ERRORS + k * LANES + i % LANES]
                 outputs.log[row, 1, k, i] = math.sqrt(g[share.P + (9 + k) * (share.STRIDE + 1)])
+
+
+@kernel
+def _gather_idle_lanes(blocks: Array, count: int) -> None:
+    """Put the lanes without an IMU where the last one is: they have weight 0, but would fall for hours otherwise."""
+    for lane in range(count, blocks.shape[0] * LANES):
+        for field in range(0, bank.SIZE, LANES):
+            if field != bank.WEIGHT:
+                blocks[lane // LANES, field + lane % LANES] = blocks[(count - 1) // LANES, field + (count - 1) % LANES]
 
 
 @kernel
@@ -375,3 +385,4 @@ def run_epochs(
         write(groups, members, states, variances, k)
         if (k - 1) % plan.log_every == 0:
             _log(state, outputs, end)
+            _gather_idle_lanes(blocks, members[-1, 1])

@@ -88,7 +88,6 @@ class NoiseGrade:
             correlation_time=correlation_time_h * HOUR,
         )
 
-
     def steady_std(self) -> NDArray[np.float64]:
         """Return the standard deviations of the twelve slow errors in the order of the filter's states, (12,)."""
         return np.concatenate([self.gyro_bias_std, self.accel_bias_std, self.gyro_scale_std, self.accel_scale_std])

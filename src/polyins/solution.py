@@ -28,6 +28,8 @@ class Innovations:
     """False where the gate rejected the fix, shape (M,)"""
     reopened: NDArray[np.bool_]
     """True where a fix was believed because it followed a run of rejections, shape (M,)"""
+    velocity_rejected: NDArray[np.bool_]
+    """True where the position was accepted and the velocity of the same fix was not, shape (M,)"""
 
 
 @dataclass(frozen=True)

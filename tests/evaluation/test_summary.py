@@ -41,7 +41,13 @@ def test_a_run_document_has_all_keys_and_the_figures():
     assert document["outages"]["each_m"] == pytest.approx([3.0, 0.0], abs=1e-6)
     assert document["outages"]["length_s"] == 10.0
     assert document["drift"]["distance_m"] == pytest.approx(480.0, rel=1e-3)
-    assert document["gnss"] == {"fixes": 59, "rejected": 1, "reopened": 0, "rejected_times_s": [1005.0]}
+    assert document["gnss"] == {
+        "fixes": 59,
+        "rejected": 1,
+        "reopened": 0,
+        "velocities_rejected": 0,
+        "rejected_times_s": [1005.0],
+    }
     assert document["start"] == {"heading": 0.5, "position": [0.0, 0.0, 0.0]}
     assert document["warnings"] == ["odd"]
 

@@ -74,9 +74,7 @@ def test_each_further_imu_helps(outages: list[Outage]) -> None:
 
 
 @pytest.mark.parametrize("method", ["single", "imu-fusion", "nav-fusion", "enav-fusion"])
-def test_with_gnss_a_whole_flight_stays_within_its_noise(
-    recordings: list[tuple[Row, Recording]], method: str
-) -> None:
+def test_with_gnss_a_whole_flight_stays_within_its_noise(recordings: list[tuple[Row, Recording]], method: str) -> None:
     for _, recording in recordings:
         solution = batch.run(replace(recording, outages=()), method)
         for name in ("position", "velocity", "attitude", "position_variance", "velocity_variance", "imu_errors"):

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 Document = dict[str, Any]
 """what `json.dumps` takes, with None instead of NaN"""
 
+GNSS_COUNTS = ("fixes", "rejected", "reopened", "velocities_rejected")
+
 NO_FIGURES = dict.fromkeys(
     ("horizontal_rms_m", "horizontal_max_m", "vertical_rms_m", "roll_rmse_deg", "pitch_rmse_deg", "heading_rmse_deg")
 )
@@ -87,7 +89,7 @@ def pooled(each: Sequence[Document]) -> Document:
         "outages": _pooled_outages([summary["outages"] for summary in each]),
         **{key: _means([summary[key] for summary in each]) for key in ("drift", "consistency")},
         "gnss": {
-            **_means([{key: summary["gnss"][key] for key in ("fixes", "rejected", "reopened")} for summary in each]),
+            **_means([{key: summary["gnss"][key] for key in GNSS_COUNTS} for summary in each]),
             "rejected_times_s": sorted({time for summary in each for time in summary["gnss"]["rejected_times_s"]}),
         },
         "warnings": list(dict.fromkeys(warning for summary in each for warning in summary["warnings"])),
@@ -123,6 +125,7 @@ def _gnss(innovations: Innovations) -> Document:
         "fixes": innovations.time.size,
         "rejected": int(np.count_nonzero(rejected)),
         "reopened": int(np.count_nonzero(innovations.reopened)),
+        "velocities_rejected": int(np.count_nonzero(innovations.velocity_rejected)),
         "rejected_times_s": innovations.time[rejected],
     }
 

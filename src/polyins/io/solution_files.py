@@ -215,4 +215,4 @@ def _read_imu_errors(path: Path, names: tuple[str, ...]) -> tuple[tuple[str, ...
 
 def _no_innovations() -> Innovations:
     none, no_rows, never = np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=bool)
-    return Innovations(none, no_rows, no_rows, none, never, never)
+    return Innovations(none, no_rows, no_rows, none, never, never, never)
