@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins import alignment
+from polyins.geodesy import metres_per_unit
 from polyins.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.rig import DEG, Imu, ImuErrors, NoiseGrade, Rig
 from polyins.simulation.increments import increments
@@ -95,7 +95,7 @@ def received(truth: Path, antenna: Array, times: Array, seed: int) -> GnssStream
     """Fixes of the antenna with 2 cm and 5 cm/s of noise."""
     rng, at = np.random.default_rng([seed, 3]), truth.truth(times, antenna)
     noise = 0.02 * rng.standard_normal((len(times), 3))
-    position = at.position + noise / alignment.metric(at.position[0], True)
+    position = at.position + noise / metres_per_unit(at.position[0], True)
     velocity = at.velocity + 0.05 * rng.standard_normal((len(times), 3))
     return GnssStream(times, position, np.full((len(times), 3), 0.02), velocity, np.full((len(times), 3), 0.05))
 
@@ -152,7 +152,7 @@ def on_a_plane(recording: Recording) -> Recording:
     assert recording.gnss is not None
 
     def metres(position: Array) -> Array:
-        return np.asarray((position - origin) * alignment.metric(origin, True) * [1.0, 1.0, -1.0])
+        return np.asarray((position - origin) * metres_per_unit(origin, True) * [1.0, 1.0, -1.0])
 
     return replace(
         recording,

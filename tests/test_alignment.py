@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from polyins import alignment
 from polyins.alignment import Start, find_standstill, find_start, level, rotation_matrix
 from polyins.errors import InputError
+from polyins.geodesy import metres_per_unit
 from polyins.kernels import earth
 from polyins.recording import GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.rig import DEG, Imu, ImuErrors, Rig
@@ -52,7 +53,7 @@ def fixes(truth: Path, times: Array, antenna: Array = AT_ORIGIN, std: float = 0.
 
 
 def fixes_at_rest(times: Array, noise: float = 0.02) -> GnssStream:
-    metres = alignment.metric(PLACE, True)
+    metres = metres_per_unit(PLACE, True)
     scatter = noise * np.random.default_rng(3).standard_normal((len(times), 3)) / metres
     return GnssStream(times, PLACE + scatter, np.full((len(times), 3), noise))
 
@@ -400,7 +401,7 @@ def test_the_position_is_that_of_the_antenna_less_its_lever_arm() -> None:
     antenna = np.array([-0.5, 0.8, -1.2])
     recording = drive_of(leaving(12.0), antenna=antenna)
     start = found(recording)
-    metres = alignment.metric(PLACE, True)
+    metres = metres_per_unit(PLACE, True)
     assert np.abs((start.position - PLACE) * metres).max() < 0.02
     assert start.sources["position"] == "GNSS"
     np.testing.assert_array_equal(start.position_std, 0.02)

@@ -31,7 +31,8 @@ from array_recordings import on_a_plane as moved_to_a_plane
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polyins import alignment, batch, engine
+from polyins import batch, engine
+from polyins.geodesy import metres_per_unit
 from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
 from polyins.methods import METHODS
@@ -166,7 +167,7 @@ def differences(recording: Recording, method: str) -> dict[str, float]:
     run.advance(1, len(run.inputs.time))
     expected = by_the_reference(recording, method, WITH_VELOCITY, velocities)
     states = run.outputs.states[1:]
-    metres = alignment.metric(run.start.position, recording.geodetic)
+    metres = metres_per_unit(run.start.position, recording.geodetic)
     P, reference_P = covariances(run), expected["covariance"]
     sigma = np.sqrt(np.diagonal(reference_P, axis1=1, axis2=2))
     turned = Rotation.from_quat(states[:, 6:], scalar_first=True).inv() * Rotation.from_quat(
@@ -275,7 +276,7 @@ def assert_bit_equal(actual: Any, expected: Any) -> None:
 
 
 def assert_same_to_rounding(actual: Any, expected: Any) -> None:
-    metres = alignment.metric(expected.position[0], expected.geodetic)
+    metres = metres_per_unit(expected.position[0], expected.geodetic)
     assert np.abs((actual.position - expected.position) * metres).max() < 2e-7
     np.testing.assert_allclose(actual.velocity, expected.velocity, atol=2e-7)
     turned = (Rotation.from_quat(actual.attitude) * Rotation.from_quat(expected.attitude).inv()).magnitude()
@@ -351,7 +352,7 @@ def test_where_the_globe_is_cut_does_not_matter(method: str) -> None:
     here, across = batch.run(recording, method), batch.run(there, method)
     wrapped = across.position - shift - here.position
     wrapped[:, 1] = (wrapped[:, 1] + np.pi) % (2.0 * np.pi) - np.pi
-    assert np.abs(wrapped * alignment.metric(here.position[0], True)).max() < 1e-6
+    assert np.abs(wrapped * metres_per_unit(here.position[0], True)).max() < 1e-6
     np.testing.assert_allclose(across.velocity, here.velocity, atol=1e-6)
     np.testing.assert_allclose(across.innovations.residual, here.innovations.residual, atol=1e-7)
 
@@ -391,7 +392,7 @@ def test_each_imu_starts_with_the_velocity_of_its_own_place(method: str) -> None
     assert np.abs(expected - run.start.velocity).max() > 0.1
     np.testing.assert_allclose(of_each_imu(run, bank.VELOCITY, 3), expected, atol=0.02)
     positions = np.array([truth.truth(time, place).position[0] for place in places])
-    metres = alignment.metric(run.start.position, True)
+    metres = metres_per_unit(run.start.position, True)
     assert np.abs((of_each_imu(run, bank.POSITION, 3) - positions) * metres).max() < 1e-6
 
 
@@ -422,7 +423,7 @@ def test_over_two_hours_the_covariance_stays_symmetric_and_positive(method: str)
             np.testing.assert_array_equal(P, P.T)
             assert np.linalg.eigvalsh(P / np.outer(sigma, sigma)).min() > 1e-9
     assert np.isfinite(run.state.blocks).all()  # lanes without an IMU, too: nothing times zero is not always nothing
-    off = (run.outputs.states[-1, :3] - run.start.position) * alignment.metric(run.start.position, True)
+    off = (run.outputs.states[-1, :3] - run.start.position) * metres_per_unit(run.start.position, True)
     assert np.abs(off).max() < 0.2
 
 
@@ -436,7 +437,7 @@ def shifted(recording: Recording, which: slice | list[int], metres: Array) -> Re
     """The recording with some fixes displaced, m north, east, down."""
     assert recording.gnss is not None
     position = recording.gnss.position.copy()
-    position[which] += metres / alignment.metric(position[0], recording.geodetic)
+    position[which] += metres / metres_per_unit(position[0], recording.geodetic)
     return replace(recording, gnss=replace(recording.gnss, position=position))
 
 
@@ -486,7 +487,7 @@ def test_without_a_gate_every_fix_is_believed() -> None:
     assert solution.innovations.accepted.all()
     assert not solution.innovations.reopened.any()
     at = np.searchsorted(solution.time, EVERY_HALF_SECOND[6])
-    moved = (solution.position[at] - solution.position[at - 1]) * alignment.metric(solution.position[0], True)
+    moved = (solution.position[at] - solution.position[at - 1]) * metres_per_unit(solution.position[0], True)
     assert moved[0] > 10.0
 
 
@@ -590,7 +591,7 @@ def test_without_gnss_the_array_coasts() -> None:
     solution = batch.run(recording, "enav-fusion")
     assert len(solution.innovations.time) == 0
     expected = shaken_path(3.0).truth(solution.time)
-    off = (solution.position - expected.position) * alignment.metric(expected.position[0], True)
+    off = (solution.position - expected.position) * metres_per_unit(expected.position[0], True)
     assert np.abs(off).max() < 0.2
 
 

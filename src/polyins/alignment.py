@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
+from polyins.geodesy import metres_per_unit
 from polyins.kernels import earth
 from polyins.recording import GnssStream, Recording, StartOptions
 from polyins.rig import DEG
@@ -253,7 +254,7 @@ class _Search:
             time, gnss.time, _from(gnss.position[nearest], gnss.position, self.recording.geodetic)
         )
         shift = rotation_matrix(attitude) @ self.recording.rig.antenna
-        return antenna - shift / metric(antenna, self.recording.geodetic), gnss.position_std[nearest]
+        return antenna - shift / metres_per_unit(antenna, self.recording.geodetic), gnss.position_std[nearest]
 
     def _gyro_biases(self, still: tuple[float, float], attitude: Array, position: Array) -> None:
         """Take what the gyros show at a standstill, less the earth's rate, as their biases."""
@@ -320,13 +321,6 @@ def rotation_matrix(attitude: Array) -> Array:
     return np.asarray(Rotation.from_euler("ZYX", attitude[::-1]).as_matrix())
 
 
-def metric(position: Array, geodetic: bool) -> Array:
-    """Return D, metres north, east, down per unit of each coordinate of a position, shape (3,)."""
-    out = np.empty(3)
-    earth.metric(np.asarray(position, dtype=float), geodetic, out)
-    return out
-
-
 def earth_rate(position: Array, geodetic: bool) -> Array:
     """Return the earth's angular rate, rad/s north, east, down, shape (3,); zero on a local plane."""
     if not geodetic:
@@ -347,7 +341,7 @@ def velocities_from_positions(gnss: GnssStream, geodetic: bool) -> GnssStream | 
 
 
 def _differences(time: Array, position: Array, geodetic: bool) -> Array:
-    metres = _from(position[0], position, geodetic) * metric(position[0], geodetic)
+    metres = _from(position[0], position, geodetic) * metres_per_unit(position[0], geodetic)
     return np.asarray(np.gradient(metres, time, axis=0))
 
 

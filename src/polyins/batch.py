@@ -13,6 +13,7 @@ from polyins import alignment, engine, timesync
 from polyins.alignment import Start
 from polyins.engine import Inputs, Outputs, Plan, State
 from polyins.errors import InputError
+from polyins.geodesy import metres_per_unit
 from polyins.kernels import bank, dense, kalman, share
 from polyins.kernels.bank import LANES
 from polyins.methods import Method, find_method
@@ -175,7 +176,7 @@ def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, g
     c = alignment.rotation_matrix(start.attitude)
     lever_arm = c @ -member.to_origin
     turning = c @ rate - alignment.earth_rate(start.position, geodetic)
-    put(bank.POSITION, start.position + lever_arm / alignment.metric(start.position, geodetic))
+    put(bank.POSITION, start.position + lever_arm / metres_per_unit(start.position, geodetic))
     put(bank.VELOCITY, start.velocity + np.cross(turning, lever_arm))
     put(bank.QUATERNION, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
     put(bank.ERRORS, member.start_errors)

@@ -10,7 +10,8 @@ from synthetic_solutions import drifting, drive, reference, solution
 
 from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
-from polyins.io.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution, written_beside
+from polyins.io.files import whole
+from polyins.io.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
 
 COLUMNS = {
     "time_s", "latitude_deg", "longitude_deg", "height_m", "north_velocity_m_s", "east_velocity_m_s",
@@ -131,7 +132,7 @@ def test_a_failure_leaves_the_old_file_and_no_other(tmp_path):
     target.write_text("old")
 
     def fail() -> None:
-        with written_beside(target) as beside:
+        with whole(target) as beside:
             beside.write_text("half")
             raise RuntimeError
 
@@ -139,7 +140,7 @@ def test_a_failure_leaves_the_old_file_and_no_other(tmp_path):
         fail()
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
-    with written_beside(target) as beside:
+    with whole(target) as beside:
         beside.write_text("new")
     assert target.read_text() == "new"
     assert list(tmp_path.iterdir()) == [target]

@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polyins import alignment, batch
+from polyins import batch
+from polyins.geodesy import metres_per_unit
 from polyins.loading import load
 from polyins.solution import Solution
 
@@ -65,7 +66,7 @@ def test_position_velocity_and_attitude(solution: Solution, folder: Path) -> Non
     k = rows_at(solution.time, expected[:, 1])
     assert len(k) > 5500
     position = expected[:, 2:5] * [DEG, DEG, 1.0]
-    metres = (solution.position[k] - position) * alignment.metric(position[0], True)
+    metres = (solution.position[k] - position) * metres_per_unit(position[0], True)
     assert np.abs(metres).max() < 2e-3
     assert np.abs(solution.velocity[k] - expected[:, 5:8]).max() < 5e-4
     assert np.abs(wrapped(euler_deg(solution)[k] - expected[:, 8:11])).max() < 5e-4
@@ -96,7 +97,7 @@ def test_the_solution_is_as_good_as_its_gnss(solution: Solution, folder: Path) -
     truth = truth[inside]
     at = np.column_stack([np.interp(truth[:, 1], solution.time, column) for column in solution.position.T])
     position = truth[:, 2:5] * [DEG, DEG, 1.0]
-    off = (at - position) * alignment.metric(position[0], True)
+    off = (at - position) * metres_per_unit(position[0], True)
     rms = np.sqrt((off**2).mean(axis=0))
     assert len(truth) > 2500
     assert np.all(rms < 0.05)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.evaluation.attitude import angular_rate, euler_angles, rotation_matrices, wrap
-from polyins.evaluation.local_level import metres_per_unit
+from polyins.geodesy import metres_per_unit
 from polyins.recording import Reference
 from polyins.rig import Vector
 from polyins.solution import Solution

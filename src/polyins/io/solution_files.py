@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +13,9 @@ from numpy.typing import NDArray
 from polyins import __version__
 from polyins.errors import InputError
 from polyins.evaluation.attitude import euler_angles, euler_variance, quaternions
-from polyins.evaluation.local_level import displacement
 from polyins.evaluation.summary import plain
+from polyins.geodesy import displacement
+from polyins.io.files import whole
 from polyins.solution import Innovations, Solution
 
 if TYPE_CHECKING:
@@ -40,17 +39,6 @@ _EULER = ("roll_deg", "pitch_deg", "heading_deg")
 _POSITION_STD = tuple(f"std_{name}" for name in _LOCAL)
 _VELOCITY_STD = tuple(f"std_{name}" for name in _VELOCITY)
 _PHI_STD = tuple(f"std_phi_{axis}_deg" for axis in _AXES)
-
-
-@contextmanager
-def written_beside(path: Path) -> Iterator[Path]:
-    """Yield a path beside `path` to write to, renamed to `path` at the end and removed on failure."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        yield beside
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def write_solution(solution: Solution, folder: Path) -> None:
@@ -164,7 +152,7 @@ def _write(columns: Mapping[str, Any], metadata: Mapping[str, object], path: Pat
         name: pa.nulls(rows, pa.float64()) if values is None else pa.array(values) for name, values in columns.items()
     }
     table = pa.table(arrays).replace_schema_metadata({METADATA: json.dumps(plain(metadata))})
-    with written_beside(path) as beside:
+    with whole(path) as beside:
         # Numbers that never repeat gain nothing from a dictionary; the names of IMUs do.
         pq.write_table(table, beside, compression="zstd", compression_level=1, use_dictionary=["imu"])
 

@@ -5,16 +5,12 @@ Each name is the offset of the first of eight lanes; vectors and matrices take c
 
 from __future__ import annotations
 
+from polyins.kernels.layout import Layout
+
 LANES = 8
 
-_fields = 0
-
-
-def _take(count: int) -> int:
-    global _fields
-    offset = _fields * LANES
-    _fields += count
-    return offset
+_layout = Layout(LANES)
+_take = _layout.take
 
 
 # navigation state of each IMU
@@ -52,4 +48,4 @@ ORIGIN_POSITION = _take(3)
 ORIGIN_VELOCITY = _take(3)
 CORRECTION = _take(21)  # error state of the last update
 
-SIZE = _fields * LANES
+SIZE = _layout.size

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from polyins.kernels.jit import Array, kernel
+from polyins.kernels.layout import Layout
 from polyins.kernels.share import STATES, STRIDE, P, mirror
 
 ROWS = 3
 
-_fields = 0
-
-
-def _take(count: int) -> int:
-    global _fields
-    offset = _fields
-    _fields += count
-    return offset
+_layout = Layout()
+_take = _layout.take
 
 
 H = _take(ROWS * STRIDE)
@@ -26,7 +21,7 @@ K = _take(STATES * ROWS)
 AH = _take(STATES * ROWS)
 RESIDUAL = _take(ROWS)
 
-SIZE = (_fields + 7) // 8 * 8
+SIZE = _layout.size
 """Length of the work array `m` of a measurement."""
 
 

@@ -11,6 +11,7 @@ import math
 
 from polyins.kernels import earth
 from polyins.kernels.jit import Array, formula, kernel
+from polyins.kernels.layout import Layout
 
 STATES = 21
 NAV = 9  # position, velocity, phi
@@ -20,14 +21,8 @@ STRIDE = 24
 HALF = 16
 SENSORS = 8  # from here on a row of P holds the covariances with IMU errors, of which the first is in column 9
 
-_fields = 0
-
-
-def _take(count: int) -> int:
-    global _fields
-    offset = _fields
-    _fields += count
-    return offset
+_layout = Layout()
+_take = _layout.take
 
 
 P = _take(STATES * STRIDE)
@@ -58,7 +53,7 @@ W = _take(NAV * HALF)
 V = _take(NAV * SENSORS)
 Z = _take(NAV * SENSORS)
 
-SIZE = (_fields + 7) // 8 * 8
+SIZE = _layout.size
 
 _V, _P, _G, _A, _GS, _AS = 3, 6, 9, 12, 15, 18
 BY_N, BY_E, BY_D, BY_VN, BY_VE, BY_VD = (F + k * HALF for k in range(6))

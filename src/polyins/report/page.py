@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from polyins import __version__
 from polyins.evaluation.summary import Document
-from polyins.io.solution_files import written_beside
+from polyins.io.files import whole
 from polyins.recording import Recording
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
 from polyins.report.imu_errors import imu_error_figure
@@ -69,7 +69,7 @@ def write_report(
         plotly=_plotly_script(),
         single_is_pooled=comparison is not None and "single" in runs,
     )
-    with written_beside(path) as beside:
+    with whole(path) as beside:
         beside.write_text(text, encoding="utf-8")
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluation.local_level import displacement
+from polyins.geodesy import displacement
 from polyins.report.decimation import kept_for_display
 from polyins.report.palette import FIXES, OUTAGE_TRACK, REFERENCE, REJECTED
 from polyins.report.scene import Run, Scene

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import batch
-from polyins.alignment import metric, rotation_matrix
+from polyins.alignment import rotation_matrix
 from polyins.evaluation.attitude import rotation_matrices
 from polyins.evaluation.consistency import nees, nees_bounds, share_inside
+from polyins.geodesy import metres_per_unit
 from polyins.kernels import share
 from polyins.recording import StartOptions
 from polyins.rig import DEG
@@ -75,7 +76,7 @@ def errors_of(scenario: Scenario, seed: int) -> tuple[Array, Array]:
 def _start(path: Path, rng: np.random.Generator) -> StartOptions:
     """Return the true state with errors drawn from the standard deviations that the filter is told."""
     truth = path.truth(np.array([STARTS_AT]))
-    metres = metric(truth.position[0], True)
+    metres = metres_per_unit(truth.position[0], True)
     # the error of attitude is phi: C_hat = (I - phi x) C
     phi = rng.normal(0.0, ATTITUDE_STD)
     c = rotation_matrix(truth.attitude[0])
@@ -99,9 +100,7 @@ def navigation_errors(states: Array, truth: Truth) -> Array:
     """Return position (m), velocity (m/s) and phi (rad) errors, estimate minus truth, shape (T, 9)."""
     from scipy.spatial.transform import Rotation
 
-    position = [
-        (estimate - true) * metric(true, True) for estimate, true in zip(states[:, 0:3], truth.position, strict=True)
-    ]
+    position = (states[:, 0:3] - truth.position) * metres_per_unit(truth.position, True)
     turned = rotation_matrices(states[:, 6:10]) @ rotation_matrices(truth.quaternion).transpose(0, 2, 1)
     phi = -Rotation.from_matrix(turned).as_rotvec()
     return np.hstack([position, states[:, 3:6] - truth.velocity, phi])

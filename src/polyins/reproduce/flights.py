@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import batch, datasets
-from polyins.alignment import metric
 from polyins.config import parse
 from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
+from polyins.geodesy import metres_per_unit
 from polyins.io.files import find
 from polyins.io.yaml_document import Document, read_yaml
 from polyins.loading import build
@@ -154,7 +154,7 @@ def fly(recording: Recording, row: Row) -> Iterator[Outage]:
 
 def _noisy(recording: Recording, generator: np.random.Generator) -> GnssStream:
     assert recording.gnss is not None
-    metres = metric(recording.gnss.position[0], recording.geodetic)
+    metres = metres_per_unit(recording.gnss.position[0], recording.geodetic)
     noise = generator.normal(0.0, NOISE, recording.gnss.position.shape) / metres
     return replace(recording.gnss, position=recording.gnss.position + noise)
 

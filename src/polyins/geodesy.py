@@ -9,18 +9,18 @@ Array = NDArray[np.float64]
 
 
 def metres_per_unit(position: Array, geodetic: bool) -> Array:
-    """Return what turns small differences of positions into metres north, east, down, shape (T, 3).
+    """Return what turns small differences of positions into metres north, east, down, shape (..., 3).
 
     For (latitude, longitude, height) that is (R_M + h, (R_N + h) cos latitude, -1) with the radii of WGS 84; on a
-    local plane (1, 1, -1). `position` has shape (T, 3).
+    local plane (1, 1, -1). `position` has shape (..., 3).
     """
     scale = np.broadcast_to([1.0, 1.0, -1.0], position.shape).copy()
     if geodetic:
         from pymap3d import rcurve
 
-        latitude, _, height = position.T
-        scale[:, 0] = rcurve.meridian(latitude, deg=False) + height
-        scale[:, 1] = (rcurve.transverse(latitude, deg=False) + height) * np.cos(latitude)
+        latitude, height = position[..., 0], position[..., 2]
+        scale[..., 0] = rcurve.meridian(latitude, deg=False) + height
+        scale[..., 1] = (rcurve.transverse(latitude, deg=False) + height) * np.cos(latitude)
     return scale
 
 

@@ -1,0 +1,459 @@
+"""The documentation says what is so: its commands and scripts run, its links lead somewhere, its tables are complete.
+
+An HTML comment before a fenced block says how to treat it:
+
+    polyins: file NAME       save the block under that name, for the commands after it
+    polyins: scenario NAME   the same, of a scenario
+    polyins: help, WHY       check command and options only
+    polyins: needs DATASET   skip without that data set
+
+`python tests/test_documentation.py` writes the tables of keys in docs/reference.md anew.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import click
+import numpy as np
+import pytest
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+import polyins as pi
+from polyins import cli, config
+from polyins.config import columns
+from polyins.io.yaml_document import read_yaml
+from polyins.simulation import scenario
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+PAGES = [REPOSITORY / "README.md", REPOSITORY / "CHANGELOG.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+REFERENCE = REPOSITORY / "docs" / "reference.md"
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+    mark: str
+
+    def __str__(self) -> str:
+        return f"{self.page.name}:{self.line}"
+
+    @property
+    def name(self) -> str | None:
+        """The file to save it as."""
+        found = re.match(r"(?:file|scenario) (\S+)", self.mark)
+        return found[1] if found else None
+
+    @property
+    def dataset(self) -> str | None:
+        found = re.match(r"needs (\S+)", self.mark)
+        return found[1] if found else None
+
+    @property
+    def commands(self) -> list[list[str]]:
+        """Those of polyins, as lists of words."""
+        return [shlex.split(line, comments=True) for line in self.text.splitlines() if line.startswith("polyins ")]
+
+
+def blocks(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    pattern = re.compile(
+        r"(?:<!-- polyins: (?P<mark>[^>]*?) -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.M | re.S
+    )
+    return [
+        Block(page, text.count("\n", 0, m.start()) + 1, m["language"], m["text"], m["mark"] or "")
+        for m in pattern.finditer(text)
+    ]
+
+
+ALL = [block for page in PAGES for block in blocks(page)]
+
+
+# --- what is written runs ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the examples and the recording that README and how-to speak of, as the current one."""
+    (tmp_path / "examples").symlink_to(REPOSITORY / "examples")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write_recording(folder: Path) -> None:
+    """Write two IMUs (x forward, y left, z up; deg/s and m/s^2), GNSS and truth as CSV."""
+    described = scenario.Scenario(
+        duration_s=150, static_s=20, rate_hz=100, imus=scenario.Board(count=2, columns=2, pitch_m=0.1), outages=()
+    )
+    recording = pi.simulate(described)
+    for name, stream in zip(("left", "right"), recording.imus, strict=True):
+        step = np.diff(stream.time, prepend=0.0)[:, None]
+        values = np.hstack([np.degrees(stream.dtheta / step), stream.dvel / step]) * [1, -1, -1, 1, -1, -1]
+        _write_csv(folder / f"{name}.csv", "t,gx,gy,gz,ax,ay,az", np.column_stack([stream.time, values]))
+    assert recording.gnss is not None
+    assert recording.reference is not None
+    for name, track in (("gnss", recording.gnss), ("truth", recording.reference)):
+        degrees = track.position * [180.0 / np.pi, 180.0 / np.pi, 1.0]
+        _write_csv(folder / f"{name}.csv", "t,lat,lon,height", np.column_stack([track.time, degrees]))
+
+
+def _write_csv(path: Path, header: str, values: np.ndarray[Any, Any]) -> None:
+    np.savetxt(path, values, delimiter=",", header=header, comments="", fmt="%.12g")
+
+
+def follow(page: Path, folder: Path) -> list[str]:
+    """Do what a page says, in order; returns what was left out for want of data."""
+    left_out = []
+    for block in blocks(page):
+        if block.name:
+            (folder / block.name).write_text(block.text, encoding="utf-8")
+        elif block.dataset and not _at_hand(block.dataset):
+            left_out.append(f"{block}: {block.dataset}")
+        elif block.language == "python":
+            exec(compile(block.text, str(block), "exec"), {"__name__": "__main__"})
+        elif block.language in ("sh", "console"):
+            for words in block.commands:
+                run(words[1:], block)
+    return left_out
+
+
+def _at_hand(dataset: str) -> bool:
+    root = os.environ.get("POLYINS_DATA")
+    return bool(root) and (Path(root or "") / dataset).is_dir()
+
+
+def run(words: list[str], block: Block) -> None:
+    """Run a command as the shell would, in this process; `>` sends its output to a file."""
+    words = [os.path.expandvars(word) for word in words]
+    if ">" in words:
+        words = words[: words.index(">")]
+    if block.mark.startswith("help"):
+        words = [*words, "--help"]
+    try:
+        cli.cli.main(words, prog_name="polyins", standalone_mode=False)
+    except click.exceptions.Exit as stopped:  # after --help
+        if stopped.exit_code:
+            pytest.fail(f"{block}: polyins {shlex.join(words)}: exit code {stopped.exit_code}")
+    except (click.ClickException, pi.InputError) as error:
+        pytest.fail(f"{block}: polyins {shlex.join(words)}: {error}")
+
+
+def test_readme_runs(desk: Path, data_folder_if_any: None, capsys: pytest.CaptureFixture[str]) -> None:
+    write_recording(desk)
+    follow(REPOSITORY / "README.md", desk)
+    summary = json.loads((desk / "polyins-out" / "summary.json").read_text())
+    assert summary["methods"]["enav-fusion"]["outages"]["count"] >= 2
+    assert "single" in capsys.readouterr().out
+    # the how-to reads what README's command wrote
+    follow(REPOSITORY / "docs" / "how-to.md", desk)
+
+
+def test_tutorial_runs(desk: Path, data_folder_if_any: None, capsys: pytest.CaptureFixture[str]) -> None:
+    left_out = follow(REPOSITORY / "docs" / "tutorial.md", desk)
+    assert (desk / "fused" / "solution.parquet").is_file()
+    out = capsys.readouterr().out
+    if not any("kfgins-parity" in text for text in left_out):
+        position = re.search(r"position (\S+) mm", out)
+        assert position
+        assert float(position[1]) < 0.1
+    if left_out:
+        pytest.skip(f"done but for {', '.join(left_out)} (set POLYINS_DATA)")
+
+
+def test_reference_runs(desk: Path) -> None:
+    follow(REFERENCE, desk)
+
+
+@pytest.fixture
+def data_folder_if_any(monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = Path(os.environ.get("POLYINS_DATA", REPOSITORY.parent / "shared" / "data"))
+    if folder.is_dir():
+        monkeypatch.setenv("POLYINS_DATA", str(folder))
+
+
+def test_a_command_of_the_readme_in_a_shell(tmp_path: Path) -> None:
+    """The others run in this process; one shows that the program's name leads there."""
+    done = subprocess.run([sys.executable, "-m", "polyins", "run", "missing.yaml"], cwd=tmp_path, capture_output=True)
+    assert done.returncode == 2
+    assert done.stdout == b""
+    assert done.stderr.count(b"\n") <= 2
+
+
+@pytest.mark.parametrize("block", [block for block in ALL if block.language == "yaml"], ids=str)
+def test_yaml_is_a_configuration(block: Block, tmp_path: Path) -> None:
+    path = tmp_path / "block.yaml"
+    path.write_text(block.text, encoding="utf-8")
+    if block.mark.startswith("scenario"):
+        scenario.read_scenario(path)
+    else:
+        assert config.parse(read_yaml(path)).imus
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in target:
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path) if path else page
+        assert file.exists(), f"{page.name}: {target}"
+        if anchor:
+            assert anchor in anchors(file), f"{page.name}: {target}"
+
+
+def anchors(page: Path) -> set[str]:
+    """The headings of a page as GitHub names them."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+# --- what is named exists ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_named_functions_exist(page: Path) -> None:
+    for name in re.findall(r"`(polyins(?:\.\w+)+)`", page.read_text(encoding="utf-8")):
+        resolve(name)
+
+
+def resolve(name: str) -> object:
+    """Return the module, function or attribute of a dotted name."""
+    parts = name.split(".")
+    for split in range(len(parts), 0, -1):
+        try:
+            found: object = import_module(".".join(parts[:split]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[split:]:
+            found = getattr(found, part)
+        return found
+    raise AssertionError(f"{name} is nowhere")
+
+
+def test_pictures_are_small() -> None:
+    pictures = list((REPOSITORY / "docs" / "pictures").glob("*"))
+    assert 0 < len(pictures) <= 3
+    assert all(picture.stat().st_size < 250_000 for picture in pictures)
+
+
+# --- the reference is complete ----------------------------------------------------------------------------------------
+
+
+def section(title: str) -> str:
+    """The text under a heading of the reference, up to the next of its rank or above."""
+    text = REFERENCE.read_text(encoding="utf-8")
+    rank = title.count("#")
+    found = re.search(rf"^{re.escape(title)}$\n(.*?)(?=^#{{1,{rank}}} |\Z)", text, flags=re.M | re.S)
+    assert found, title
+    return found[1]
+
+
+COMMANDS = cli.cli.commands
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_and_option_is_listed(name: str) -> None:
+    command, text = COMMANDS[name], section(f"### polyins {name}")
+    listed = set(re.findall(r"^\| `(--[\w-]+)`", text, flags=re.M))
+    options = {option for p in command.params if isinstance(p, click.Option) for option in p.opts}
+    assert listed == options
+    for p in command.params:
+        if isinstance(p, click.Argument):
+            assert p.make_metavar(click.Context(command)) in text
+        elif isinstance(p.default, str):
+            assert f"| `{p.opts[0]}` | `{p.default}`" in text
+    for sub in getattr(command, "commands", {}):
+        assert re.search(rf"`polyins\s{name}\s{sub}\b", text)
+
+
+def test_every_target_and_method_is_listed() -> None:
+    from polyins.methods import METHODS
+    from polyins.reproduce.targets import TARGETS
+
+    assert all(f"`{target}`" in section("### polyins reproduce") for target in TARGETS)
+    assert all(f"`{method}`" in section("### polyins run") for method in METHODS)
+    readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    assert all(f"| `{method}` |" in readme for method in METHODS)
+
+
+def test_every_public_name_is_listed() -> None:
+    text = section("## Python")
+    assert all(f"pi.{name}" in text for name in pi.__all__)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short run."""
+    from polyins import results
+
+    folder = tmp_path_factory.mktemp("written")
+    recording = pi.simulate(scenario.Scenario(duration_s=40, static_s=10, rate_hz=50, imus=scenario.Board(count=2)))
+    comparison = pi.compare(recording, ["single", "enav-fusion"])
+    results.write_comparison(folder, recording, comparison, report=False)
+    return folder
+
+
+@pytest.mark.parametrize("name", ["solution", "imu_errors"])
+def test_every_column_is_listed(name: str, written: Path) -> None:
+    from pyarrow import parquet
+
+    listed = re.findall(r"^\| (`[^|]*) \|", section(f"### {name}.parquet"), flags=re.M)
+    names = [column for cell in listed for column in re.findall(r"`(\w+)`", cell)]
+    assert sorted(names) == sorted(parquet.read_schema(written / "enav-fusion" / f"{name}.parquet").names)
+
+
+def test_every_key_of_the_summaries_is_listed(written: Path) -> None:
+    document = json.loads((written / "summary.json").read_text())
+    listed = {"run": section("### run"), "compare": section("### compare")}
+    assert all(f"`{key}`" in listed["compare"] for key in document if key != "polyins")
+    for path in keys(document["methods"]["enav-fusion"]):
+        assert f"`{path}`" in listed["run"], path
+
+
+def keys(document: dict[str, Any]) -> Iterator[str]:
+    for key, value in document.items():
+        yield key
+        if isinstance(value, dict):
+            yield from keys(value)
+
+
+CONFIGURATION: dict[str, type[BaseModel]] = {
+    "the whole file": config.Config,
+    "imus[], imu_defaults": config.ImuEntry,
+    "columns of an IMU": config.ImuColumns,
+    "columns.gyro": columns.GyroColumns,
+    "columns.accel": columns.AccelColumns,
+    "noise": config.Noise,
+    "initial_errors": config.InitialErrors,
+    "initial_std": config.InitialStd,
+    "gnss": config.GnssEntry,
+    "reference": config.ReferenceEntry,
+    "columns of positions": config.TrackColumns,
+    "columns.time": columns.TimeColumn,
+    "columns.position": columns.PositionColumns,
+    "columns.std, columns.velocity_std": columns.StdColumns,
+    "columns.velocity": columns.VelocityColumns,
+    "columns.attitude": columns.AttitudeColumns,
+    "start": config.Start,
+    "start.position": config.StartPosition,
+    "outages": config.OutageSchedule,
+    "filter": config.Filter,
+}
+SCENARIO: dict[str, type[BaseModel]] = {
+    "the whole scenario": scenario.Scenario,
+    "imus": scenario.Board,
+    "errors": scenario.Errors,
+    "gnss of a scenario": scenario.Fixes,
+    "gnss.lies": scenario.Lies,
+}
+KINDS = (
+    (config.Outages, "mapping or list of two numbers each"),
+    (config.Pair, "two numbers"),
+    (config.Triple, "three numbers"),
+    (config.PerAxis, "number or three"),
+    (config.Spread, "number or three, not negative"),
+    (config.Positive, "number above zero"),
+    (config.Number, "number"),
+    (columns.ThreeColumns, "three columns"),
+    (columns.Column, "name or number"),
+)
+
+
+def kind(hint: Any) -> str:
+    """Say in words what a field takes."""
+    for alias, words in KINDS:
+        if hint == alias:
+            return words
+    arguments = [argument for argument in get_args(hint) if argument is not type(None)]
+    if get_origin(hint) is Annotated:
+        return kind(arguments[0])
+    if get_origin(hint) is Literal:
+        return ", ".join(f"`{argument}`" for argument in arguments)
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        return "mapping"
+    if hint in (bool, int, float, str):
+        return {bool: "`true` or `false`", int: "whole number", float: "number", str: "text"}[hint]
+    if type(None) in get_args(hint) and len(arguments) == 1:
+        return kind(arguments[0])
+    if get_origin(hint) is tuple and Ellipsis not in arguments and len(set(arguments)) == 1:
+        return f"list of {len(arguments)}"
+    return "list"
+
+
+def shown(field: Any, model: type[BaseModel]) -> str:
+    """A field's default as YAML would have it."""
+    if field.is_required():
+        return "the grade's" if model is config.Noise else "required"
+    value = field.default
+    if value is PydanticUndefined or isinstance(value, BaseModel):
+        return "see there"
+    if value is None or value in ((), ""):
+        return "none"
+    return f"`{json.dumps(value)}`" if not isinstance(value, str) else f"`{value}`"
+
+
+def table(title: str, model: type[BaseModel]) -> str:
+    hints = get_type_hints(model, include_extras=True)
+    rows = [
+        f"| `{name}` | {kind(hints[name])} | {shown(field, model)} | {field.description} |"
+        for name, field in model.model_fields.items()
+    ]
+    return "\n".join([f"### {title}\n", "| key | value | default | what it is |", "|---|---|---|---|", *rows])
+
+
+def grades() -> str:
+    names = list(config.NOISE_GRADES)
+    rows = [
+        f"| `{key}` | " + " | ".join(f"{config.NOISE_GRADES[name][key]:g}" for name in names) + " |"
+        for key in config.NOISE_GRADES[names[0]]
+    ]
+    header = ["### Grades of noise\n", "| | " + " | ".join(f"`{name}`" for name in names) + " |", "|---|---|---|---|"]
+    return "\n".join([*header, *rows])
+
+
+def with_tables(text: str) -> str:
+    """Return the reference with its tables of keys as the models have them."""
+    parts = {
+        "keys": [*(table(title, model) for title, model in CONFIGURATION.items()), grades()],
+        "scenario keys": [table(title, model) for title, model in SCENARIO.items()],
+    }
+    for name, tables in parts.items():
+        begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+        head, _, rest = text.partition(begin)
+        _, _, tail = rest.partition(end)
+        text = head + begin + "\n" + "\n\n".join(tables) + "\n" + end + tail
+    return text
+
+
+def test_every_key_is_listed() -> None:
+    text = REFERENCE.read_text(encoding="utf-8")
+    assert text == with_tables(text), "python tests/test_documentation.py writes the tables anew"
+
+
+def test_every_model_has_a_table() -> None:
+    named = [getattr(config, name) for name in config.__all__]
+    sections = {m for m in named if isinstance(m, type) and issubclass(m, config.Section)} - {config.Section}
+    assert sections - {config.ImuSettings} <= set(CONFIGURATION.values())
+    assert set(config.ImuSettings.model_fields) <= set(config.ImuEntry.model_fields)
+
+
+if __name__ == "__main__":
+    REFERENCE.write_text(with_tables(REFERENCE.read_text(encoding="utf-8")), encoding="utf-8")
