@@ -17,7 +17,7 @@ from polyins.geodesy import metres_per_unit
 from polyins.kernels import bank, dense, kalman, share
 from polyins.kernels.bank import LANES
 from polyins.methods import Method, find_method
-from polyins.recording import GnssStream, Recording
+from polyins.recording import Recording
 from polyins.rig import Imu, NoiseGrade, Rig
 from polyins.solution import Innovations, Solution
 from polyins.timesync import Aligned
@@ -214,25 +214,17 @@ def build_plan(row: Method, recording: Recording, aligned: Aligned) -> Plan:
 
 def build_inputs(recording: Recording, aligned: Aligned) -> Inputs:
     """Return the aligned increments and the fixes that the filter is shown."""
-    time, fixes = np.empty(0), np.empty((0, 12))
-    if recording.gnss is not None:
-        gnss = recording.gnss
-        shown = (gnss.time > aligned.time[0]) & (gnss.time <= aligned.time[-1])
-        for begin, end in recording.outages:
-            shown &= ~((gnss.time > begin) & (gnss.time < end))
-        time, fixes = gnss.time[shown], _fixes(gnss)[shown]
-    return Inputs(aligned.time, np.ascontiguousarray(aligned.increments), time, fixes)
-
-
-def _fixes(gnss: GnssStream) -> Array:
-    rows = np.zeros((len(gnss.time), 12))
-    rows[:, 0:3] = gnss.position
-    rows[:, 6:9] = gnss.position_std**2
-    rows[:, 9:12] = -1.0
+    gnss = recording.gnss
+    if gnss is None:
+        return Inputs(aligned.time, np.ascontiguousarray(aligned.increments), np.empty(0), np.empty((0, 6)), None)
+    shown = (gnss.time > aligned.time[0]) & (gnss.time <= aligned.time[-1])
+    for begin, end in recording.outages:
+        shown &= ~((gnss.time > begin) & (gnss.time < end))
+    velocities = None
     if gnss.velocity is not None and gnss.velocity_std is not None:
-        rows[:, 3:6] = gnss.velocity
-        rows[:, 9:12] = gnss.velocity_std**2
-    return rows
+        velocities = np.hstack([gnss.velocity, gnss.velocity_std**2])[shown]
+    fixes = np.hstack([gnss.position, gnss.position_std**2])[shown]
+    return Inputs(aligned.time, np.ascontiguousarray(aligned.increments), gnss.time[shown], fixes, velocities)
 
 
 def build_outputs(epochs: int, fixes: int, imus: int, log_every: int) -> Outputs:

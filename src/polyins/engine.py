@@ -71,7 +71,9 @@ class Inputs(NamedTuple):
     fix_time: Array
     """(M,)"""
     fixes: Array
-    """(M, 12): position 3, velocity 3, variance of position 3 and of velocity 3 (negative: no velocity)"""
+    """(M, 6): position 3, its variance 3"""
+    velocities: Array | None
+    """(M, 6): velocity 3, its variance 3; None where the receiver gives none, which spares compiling their update"""
 
 
 class Outputs(NamedTuple):
@@ -168,7 +170,7 @@ def aid_by_position(state: State, plan: Plan, fix: Array, innovation: Array) -> 
         gnss.position_design(g, m)
         gnss.position_residuals(state.blocks, first, last, fix, metres, geodetic, m)
         for a in range(3):
-            m[kalman.R + a] = fix[6 + a]
+            m[kalman.R + a] = fix[3 + a]
         kalman.gain(g, m)
         nis += kalman.normalized_innovation_squared(m) / state.members.shape[0]
     _record(state, nis, innovation)
@@ -194,7 +196,7 @@ def aid_by_velocity(state: State, plan: Plan, fix: Array) -> bool:
         gnss.velocity_design(g, m, w[bank.EARTH_RATE + lane], w[bank.EARTH_RATE + LANES + lane])
         gnss.velocity_residuals(state.blocks, state.members[s, 0], state.members[s, 1], fix, state.clock[1], m)
         for a in range(3):
-            m[kalman.R + a] = fix[9 + a]
+            m[kalman.R + a] = fix[3 + a]
         kalman.gain(g, m)
         nis += kalman.normalized_innovation_squared(m) / state.members.shape[0]
     if not nis <= plan.gate_limit:
@@ -250,14 +252,14 @@ def _correct(state: State) -> None:
 
 
 @kernel
-def aid(state: State, plan: Plan, inputs: Inputs, outputs: Outputs) -> None:
+def aid(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, velocities: Array | None) -> None:
     """Apply the next fix to the state as it is."""
     j = state.counters[0]
     state.counters[0] += 1
-    fix = inputs.fixes[j]
-    status = aid_by_position(state, plan, fix, outputs.innovations[j])
-    if status != REJECTED and fix[9] > 0.0 and not aid_by_velocity(state, plan, fix):
-        status += VELOCITY_REJECTED
+    status = aid_by_position(state, plan, inputs.fixes[j], outputs.innovations[j])
+    if velocities is not None:
+        if status != REJECTED and not aid_by_velocity(state, plan, velocities[j]):
+            status += VELOCITY_REJECTED
     outputs.fix_status[j] = status
 
 
@@ -271,11 +273,10 @@ def load(blocks: Array, raw: Array) -> None:
                 w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
 
 
-@kernel
 def begin(state: State, plan: Plan, raw: Array, interval: float) -> None:
     """Complete a state that holds positions, velocities, quaternions and errors.
 
-    The increments that end at the start are the previous ones of the first epoch.
+    The increments that end at the start are the previous ones of the first epoch. Runs once, so it is not compiled.
     """
     if plan.virtual:
         fuse.average_increments(raw, interval, plan.to_origin, state.before, state.blocks)
@@ -376,11 +377,11 @@ def run_epochs(
                 dt = next_fix - now
                 propagate(blocks, groups, members, near, clock, shared, dt / interval, dt, work)
                 now = next_fix
-            aid(state, plan, inputs, outputs)
+            aid(state, plan, inputs, outputs, inputs.velocities)
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
         propagate(blocks, groups, members, near, clock, shared, (end - now) / interval, end - now, work)
         while next_fix <= end + snap:
-            aid(state, plan, inputs, outputs)
+            aid(state, plan, inputs, outputs, inputs.velocities)
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
         write(groups, members, states, variances, k)
         if (k - 1) % plan.log_every == 0:

@@ -78,7 +78,7 @@ def position_residuals(
 def velocity_residuals(blocks: Array, first: int, last: int, fix: Array, dt: float, m: Array) -> None:
     """Write predicted minus measured antenna velocity of each member, m/s, and their mean.
 
-    `fix` holds the velocity from its fourth element on; the rate is the mean of the last `dt` seconds.
+    The rate is the mean of the last `dt` seconds.
     """
     for a in range(3):
         m[kalman.RESIDUAL + a] = 0.0
@@ -93,9 +93,9 @@ def velocity_residuals(blocks: Array, first: int, last: int, fix: Array, dt: flo
         we = w[c + 3 * LANES] * x + w[c + 4 * LANES] * y + w[c + 5 * LANES] * z
         wd = w[c + 6 * LANES] * x + w[c + 7 * LANES] * y + w[c + 8 * LANES] * z - w[bank.EARTH_RATE + LANES + lane]
         vn, ve, vd = _cross(wn, we, wd, ln, le, ld)
-        rn = w[bank.VELOCITY + lane] + vn - fix[3]
-        re = w[bank.VELOCITY + LANES + lane] + ve - fix[4]
-        rd = w[bank.VELOCITY + 2 * LANES + lane] + vd - fix[5]
+        rn = w[bank.VELOCITY + lane] + vn - fix[0]
+        re = w[bank.VELOCITY + LANES + lane] + ve - fix[1]
+        rd = w[bank.VELOCITY + 2 * LANES + lane] + vd - fix[2]
         weights += _keep_residual(w, lane, rn, re, rd, m)
     for a in range(3):
         m[kalman.RESIDUAL + a] /= weights

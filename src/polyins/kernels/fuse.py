@@ -9,6 +9,15 @@ from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, kernel
 
 
+# field of the bank, place in the share, how many
+MEASUREMENTS = ((bank.DTHETA, share.RATE, 3), (bank.DVEL, share.FORCE, 3))
+STATES = (
+    (bank.ORIGIN_POSITION, share.POSITION, 3),
+    (bank.ORIGIN_VELOCITY, share.VELOCITY, 3),
+    (bank.QUATERNION, share.QUATERNION, 4),
+)
+
+
 @kernel
 def project_to_origin(w: Array, dt: float) -> None:
     """Shift position and velocity of each IMU of a block to the array origin, paper A (15)-(16).
@@ -65,8 +74,8 @@ def fuse_measurements(blocks: Array, first: int, last: int, g: Array, dt: float)
             g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane]
             g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane]
     else:
-        _mean(blocks, first, last, bank.DTHETA, g, share.RATE, 3)
-        _mean(blocks, first, last, bank.DVEL, g, share.FORCE, 3)
+        for field, to, count in MEASUREMENTS:
+            _mean(blocks, first, last, field, g, to, count)
     per_second = 1.0 / dt
     for k in range(3):
         g[share.RATE + k] *= per_second
@@ -88,9 +97,8 @@ def fuse_states(blocks: Array, first: int, last: int, g: Array) -> None:
         for k in range(4):
             g[share.QUATERNION + k] = blocks[block, bank.QUATERNION + k * LANES + lane]
     else:
-        _mean(blocks, first, last, bank.ORIGIN_POSITION, g, share.POSITION, 3)
-        _mean(blocks, first, last, bank.ORIGIN_VELOCITY, g, share.VELOCITY, 3)
-        _mean(blocks, first, last, bank.QUATERNION, g, share.QUATERNION, 4)
+        for field, to, count in STATES:
+            _mean(blocks, first, last, field, g, to, count)
         norm = 0.0
         for k in range(4):
             norm += g[share.QUATERNION + k] * g[share.QUATERNION + k]

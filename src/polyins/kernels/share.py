@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from polyins.kernels import earth
-from polyins.kernels.jit import Array, formula, kernel
+from polyins.kernels.jit import Array, kernel
 from polyins.kernels.layout import Layout
 
 STATES = 21
@@ -166,19 +166,18 @@ def error_model(g: Array, dt: float, near: Array) -> None:
 Three = tuple[float, float, float]
 
 
-@formula
-def _factors(g: Array, i: int, column: int) -> Three:
-    """Row i of F dt in three columns."""
-    f = F + column * HALF + i
+@kernel
+def _factors(g: Array, f: int) -> Three:
+    """F dt in three columns of one row, from the place of the first on."""
     return g[f], g[f + HALF], g[f + 2 * HALF]
 
 
-@formula
+@kernel
 def _column(g: Array, x: int, stride: int) -> Three:
     return g[x], g[x + stride], g[x + 2 * stride]
 
 
-@formula
+@kernel
 def _dot(a: Three, b: Three) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -186,14 +185,13 @@ def _dot(a: Three, b: Three) -> float:
 Row = tuple[float, float, Three, float, float]
 
 
-@formula
-def _row(g: Array, i: int) -> Row:
+@kernel
+def _row(g: Array, i: int, k: int, m: int) -> Row:
     """Row i of F dt among the navigation states: no error depends on longitude, phi enters as a vector product."""
-    k, m = _P + (i + 1) % 3, _P + (i + 2) % 3
-    return g[F + i], g[F + 2 * HALF + i], _factors(g, i, _V), g[F + k * HALF + i], g[F + m * HALF + i]
+    return g[F + i], g[F + 2 * HALF + i], _factors(g, F + _V * HALF + i), g[F + k * HALF + i], g[F + m * HALF + i]
 
 
-@formula
+@kernel
 def _times(f: Row, r: Three, v: Three, p1: float, p2: float) -> float:
     return (f[0] * r[0] + f[1] * r[2]) + _dot(f[2], v) + (f[3] * p1 + f[4] * p2)
 
@@ -202,8 +200,9 @@ def _times(f: Row, r: Three, v: Three, p1: float, p2: float) -> float:
 def _through_navigation(g: Array, dt: float) -> None:
     """T = A [N C]."""
     # all factors before the loop: loads in it that do not move would keep it from vectorizing
-    f0, f1 = _factors(g, 0, 0), _factors(g, 1, 0)
-    f3, f4, f5, f6, f7, f8 = _row(g, 3), _row(g, 4), _row(g, 5), _row(g, 6), _row(g, 7), _row(g, 8)
+    f0, f1 = _factors(g, F + 0), _factors(g, F + 1)
+    f3, f4, f5 = _row(g, _V + 0, _P + 1, _P + 2), _row(g, _V + 1, _P + 2, _P + 0), _row(g, _V + 2, _P + 0, _P + 1)
+    f6, f7, f8 = _row(g, _P + 0, _P + 1, _P + 2), _row(g, _P + 1, _P + 2, _P + 0), _row(g, _P + 2, _P + 0, _P + 1)
     for j in range(STRIDE):
         r = _column(g, P + j, STRIDE)
         v = _column(g, P + _V * STRIDE + j, STRIDE)
@@ -219,7 +218,7 @@ def _through_navigation(g: Array, dt: float) -> None:
         g[T + 8 * STRIDE + j] = p[2] + _times(f8, r, v, p[0], p[1])
 
 
-@formula
+@kernel
 def _put_c(g: Array, i: int, j: int, half: float) -> None:
     """Element of W = A C + G B / 2 and of the new C = (A C + G B) D."""
     w = g[T + i * STRIDE + SENSORS + j] + half
@@ -227,12 +226,12 @@ def _put_c(g: Array, i: int, j: int, half: float) -> None:
     g[P + i * STRIDE + SENSORS + j] = g[FACTOR + SENSORS + j] * (w + half)
 
 
-@formula
+@kernel
 def _half(f: Three, b: Three, h: Three, s: Three) -> float:
     return 0.5 * (_dot(f, b) + _dot(h, s))
 
 
-@formula
+@kernel
 def _decay(g: Array, k: int, j: int, factors: Three, b: Three) -> None:
     """Three rows of B <- D B D."""
     factor = g[FACTOR + SENSORS + j]
@@ -246,10 +245,10 @@ def _through_sensors(g: Array, dt: float) -> None:
     """Bring B and C up to date and leave W behind."""
     for k in range(12):
         g[FACTOR + NAV + k] = 1.0 - dt * g[DECAY + k]
-    f3, f4, f5 = _factors(g, 3, _A), _factors(g, 4, _A), _factors(g, 5, _A)
-    f6, f7, f8 = _factors(g, 6, _G), _factors(g, 7, _G), _factors(g, 8, _G)
-    h3, h4, h5 = _factors(g, 3, _AS), _factors(g, 4, _AS), _factors(g, 5, _AS)
-    h6, h7, h8 = _factors(g, 6, _GS), _factors(g, 7, _GS), _factors(g, 8, _GS)
+    f3, f4, f5 = _factors(g, F + _A * HALF + 3), _factors(g, F + _A * HALF + 4), _factors(g, F + _A * HALF + 5)
+    f6, f7, f8 = _factors(g, F + _G * HALF + 6), _factors(g, F + _G * HALF + 7), _factors(g, F + _G * HALF + 8)
+    h3, h4, h5 = _factors(g, F + _AS * HALF + 3), _factors(g, F + _AS * HALF + 4), _factors(g, F + _AS * HALF + 5)
+    h6, h7, h8 = _factors(g, F + _GS * HALF + 6), _factors(g, F + _GS * HALF + 7), _factors(g, F + _GS * HALF + 8)
     d_b, d_a = _column(g, FACTOR + _G, 1), _column(g, FACTOR + _A, 1)
     d_sb, d_sa = _column(g, FACTOR + _GS, 1), _column(g, FACTOR + _AS, 1)
     for j in range(HALF):
@@ -272,7 +271,7 @@ def _through_sensors(g: Array, dt: float) -> None:
         _decay(g, _AS, j, d_sa, sa)
 
 
-@formula
+@kernel
 def _back_row(g: Array, i: int) -> None:
     """Row i of V = (A N) A' and of Z = W G', the first eight columns."""
     t, w = T + i * STRIDE, W + i * HALF - SENSORS
