@@ -114,6 +114,9 @@ def test_info_init_and_convert(config: Path, tmp_path: Path) -> None:
         (["run", "CONFIG", "--method", "enav-fussion"], ["enav-fussion", "did you mean 'enav-fusion'"]),
         (["compare", "CONFIG", "--methods", "single,kalman"], ["kalman", "known: single"]),
         (["run", "CONFIG", "--method", "single", "--imu", "imu9"], ["imu9", "imu1, imu2, imu3"]),
+        (["run", "CONFIG", "--method", "enav-fusion", "--imu", "imu1"], ["--imu", "single"]),
+        (["compare", "CONFIG", "--methods", ""], ["''", "known: single"]),
+        (["run", "CONFIG", "--out", "CONFIG"], ["--out"]),
         (["reproduce", "flight"], ["flight", "did you mean 'flights'"]),
         (["datasets", "info", "quadrotr"], ["quadrotr", "did you mean quadrotor"]),
         (["evaluate", "nothing", "--reference", "CONFIG"], ["nothing"]),
@@ -135,12 +138,12 @@ def test_wrong_commands_exit_with_2_and_say_what_was_expected(
 
 
 def test_a_failure_while_running_exits_with_1_and_a_traceback_only_on_request(config: Path, tmp_path: Path) -> None:
-    (tmp_path / "taken").write_text("a file where the folder should go")
-    done = polyins("run", config, "--out", tmp_path / "taken" / "out")
+    (tmp_path / "out/solution.parquet").mkdir(parents=True)  # a folder where the file should go
+    done = polyins("run", config, "--out", tmp_path / "out")
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     assert len(done.stderr.strip().splitlines()) <= 4
-    shown = polyins("run", config, "--out", tmp_path / "taken" / "out", "--debug")
+    shown = polyins("run", config, "--out", tmp_path / "out", "--debug")
     assert shown.returncode == 1
     assert "Traceback" in shown.stderr
 

@@ -162,7 +162,7 @@ def by_the_reference(recording: Recording, method: str, velocity_of: int, veloci
 def differences(recording: Recording, method: str) -> dict[str, float]:
     """The largest ones: m, m/s and rad of the merged states at all epochs; standard deviations for the rest."""
     run = batch.prepare(recording, method)
-    run.inputs.fixes[np.arange(len(FIX_TIMES)) != WITH_VELOCITY, 9:] = -1.0
+    run.inputs.velocities[np.arange(len(FIX_TIMES)) != WITH_VELOCITY, 3:] = -1.0
     velocities = np.broadcast_to(of_each_imu(run, bank.VELOCITY, 3), (len(recording.imus), 3)).copy()
     run.advance(1, len(run.inputs.time))
     expected = by_the_reference(recording, method, WITH_VELOCITY, velocities)
@@ -518,7 +518,7 @@ def test_a_wrong_velocity_is_refused_and_its_position_used(method: str) -> None:
     np.testing.assert_array_equal(lied.outputs.fix_status, status)
 
     def drop(run: batch.Prepared) -> None:
-        run.inputs.fixes[6, 9:] = -1.0
+        run.inputs.velocities[6, 3:] = -1.0
 
     missing = advanced_with(replace(recording, gnss=gnss), method, drop)
     np.testing.assert_array_equal(lied.outputs.states[1:], missing.outputs.states[1:])

@@ -21,6 +21,7 @@ STILL_RATE = 0.4 * DEG  # rad/s, of the averaged gyro within a window
 STILL_FORCE = 0.10  # m/s^2
 SHORTEST_STANDSTILL = 3.0  # s
 LONGEST_STANDSTILL = 60.0  # s
+FARTHEST_START = 10e3  # m from GNSS: farther away it is another place
 LEAST_LEFT = 1.0  # s, of data after the start
 COURSE_SPEED = 1.5  # m/s: slower than this the direction of motion is no heading
 
@@ -70,6 +71,8 @@ class _Search:
         # differences at the first two fixes are one-sided, in velocity or in the acceleration that follows from it
         given = recording.gnss is not None and recording.gnss.velocity is not None
         self.first_moving = 0 if given else 2
+        # a fix that lies shows in two differences: a median over five has neither
+        self.usual = None if self.fixes is None else usual_velocity(self.fixes)
 
     def run(self) -> Start:
         still = self._standstill()
@@ -120,6 +123,8 @@ class _Search:
             wanted, self.sources["time"] = self.options.time, "given"
         elif still:
             wanted, self.sources["time"] = min(still[1], last - LEAST_LEFT), "end of the standstill"
+            if self.recording.gnss is not None and self.options.position is None:
+                wanted = max(wanted, float(self.recording.gnss.time[0]))
         elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
             wanted, self.sources["time"] = self._moving(first), "first fix in motion"
         elif self.fixes is not None and self.options.position is None:
@@ -137,8 +142,10 @@ class _Search:
         """Return the time of the first fix after `after` whose speed makes its course a heading."""
         assert self.fixes is not None
         assert self.fixes.velocity is not None
-        speed = np.hypot(self.fixes.velocity[:, 0], self.fixes.velocity[:, 1])
-        moving = np.flatnonzero((speed > COURSE_SPEED) & (self.fixes.time >= after))
+        assert self.usual is not None
+        speed = np.hypot(self.usual[:, 0], self.usual[:, 1])
+        believable = np.linalg.norm(self.fixes.velocity - self.usual, axis=1) < 0.5 + 0.3 * speed
+        moving = np.flatnonzero((speed > COURSE_SPEED) & believable & (self.fixes.time >= after))
         moving = moving[moving >= self.first_moving]
         if len(moving) == 0:
             raise InputError(
@@ -183,7 +190,7 @@ class _Search:
             self.sources["roll_pitch"] = "reference"
             attitude = _interpolate(time, reference.time, reference.attitude[:, :2])
             return (float(attitude[0]), float(attitude[1])), 3.0 * DEG
-        if still:
+        if still and still[0] <= time <= still[1] + 0.5:
             self.sources["roll_pitch"] = "levelled at standstill"
             _, force, _ = self._mean(*still)
             bias_std = self.error_std[:, 3:6].mean() / 9.8
@@ -243,18 +250,35 @@ class _Search:
     def _position(self, time: float, attitude: Array) -> tuple[Array, Array]:
         if self.options.position is not None:
             self.sources["position"] = "given"
+            self._check_place(time, self.options.position)
             return self.options.position, np.full(3, 0.1)
-        gnss = self.recording.gnss
+        gnss, reference = self.recording.gnss, self.recording.reference
+        if gnss is None and reference is not None:
+            self.sources["position"] = "reference"
+            point = _interpolate_position(time, reference.time, reference.position, self.recording.geodetic)
+            shift = rotation_matrix(attitude) @ reference.lever_arm
+            return point - shift / metres_per_unit(point, self.recording.geodetic), np.full(3, 0.1)
         if gnss is None:
             self.sources["position"] = "zero: there is no position in the recording"
             return np.zeros(3), np.full(3, 0.01)
         self.sources["position"] = "GNSS"
         nearest = int(np.argmin(np.abs(gnss.time - time)))
-        antenna = gnss.position[nearest] + _interpolate(
-            time, gnss.time, _from(gnss.position[nearest], gnss.position, self.recording.geodetic)
-        )
+        antenna = _interpolate_position(time, gnss.time, gnss.position, self.recording.geodetic)
         shift = rotation_matrix(attitude) @ self.recording.rig.antenna
         return antenna - shift / metres_per_unit(antenna, self.recording.geodetic), gnss.position_std[nearest]
+
+    def _check_place(self, time: float, position: Array) -> None:
+        gnss = self.recording.gnss
+        if gnss is None:
+            return
+        nearest = gnss.position[int(np.argmin(np.abs(gnss.time - time)))]
+        off = _from(nearest, position[None, :], self.recording.geodetic)[0]
+        distance = float(np.linalg.norm(off * metres_per_unit(nearest, self.recording.geodetic)))
+        if distance > FARTHEST_START:
+            raise InputError(
+                f"start: position is {distance / 1e3:.1f} km from GNSS at {time:.3f} s;"
+                f" expected it within {FARTHEST_START / 1e3:.0f} km"
+            )
 
     def _gyro_biases(self, still: tuple[float, float], attitude: Array, position: Array) -> None:
         """Take what the gyros show at a standstill, less the earth's rate, as their biases."""
@@ -269,11 +293,18 @@ class _Search:
         self.sources["gyro_bias"] = f"mean of {duration:.1f} s at standstill"
 
 
+def usual_velocity(fixes: GnssStream) -> Array:
+    """Return the velocities with each component's median over five fixes, m/s, shape (M, 3)."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(fixes.velocity, size=(5, 1), mode="nearest"))
+
+
 def find_standstill(aligned: Aligned, fixes: GnssStream | None) -> tuple[float, float] | None:
     """Return the first interval of at least three seconds, at most sixty, in which the array stands still.
 
-    Judged second by second: rates and forces averaged over tenths of a second hardly vary, and the speed that GNSS
-    gives, where it gives one, is that of its noise.
+    Judged second by second: rates and forces averaged over tenths of a second hardly vary, and the usual speed that
+    GNSS gives, where it gives one, is that of its noise.
     """
     window = max(2, round(WINDOW * aligned.rate_hz))
     tenth = max(1, round(0.1 * aligned.rate_hz))
@@ -287,7 +318,7 @@ def find_standstill(aligned: Aligned, fixes: GnssStream | None) -> tuple[float, 
     still = (spread[:, :3].max(axis=1) < STILL_RATE) & (spread[:, 3:].max(axis=1) < STILL_FORCE)
     edges = aligned.time[np.minimum(np.arange(count + 1) * tenths * tenth, len(aligned.time) - 1)]
     if fixes is not None and fixes.velocity is not None:
-        speed = np.linalg.norm(fixes.velocity, axis=1)
+        speed = np.linalg.norm(usual_velocity(fixes), axis=1)
         noise = 4.0 * fixes.position_std.max(axis=1)
         moving = fixes.time[speed > np.maximum(0.3, noise)]
         for t in moving:
@@ -351,6 +382,11 @@ def _from(origin: Array, position: Array, geodetic: bool) -> Array:
     if geodetic:
         relative[:, 1] = (relative[:, 1] + np.pi) % (2.0 * np.pi) - np.pi
     return np.asarray(relative)
+
+
+def _interpolate_position(at: float, time: Array, position: Array, geodetic: bool) -> Array:
+    nearest = position[int(np.argmin(np.abs(time - at)))]
+    return np.asarray(nearest + _interpolate(at, time, _from(nearest, position, geodetic)))
 
 
 def _interpolate(at: float, time: Array, values: Array) -> Array:

@@ -45,8 +45,9 @@ def main() -> None:
         cli.main(arguments, prog_name="polyins", standalone_mode=False)
     except click.exceptions.Exit as exit_:
         sys.exit(exit_.exit_code)
-    except click.ClickException as error:
-        error.show()
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else "polyins"
+        say(f"polyins: {error.format_message()} See {command} --help")
         sys.exit(2)
     except click.Abort:
         say("polyins: stopped")
@@ -90,9 +91,12 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
 
     if method is not None:
         find_method(method)
+    if imu is not None and method not in (None, "single"):
+        raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
     recording = load(config)
-    name = method or ("enav-fusion" if len(recording.imus) > 1 else "single")
+    name = method or ("enav-fusion" if len(recording.imus) > 1 and imu is None else "single")
     index = _imu_index([one.name for one in recording.rig.imus], imu)
+    results.make_folder(out)
     announce_compilation()
     with progress(name) as update:
         solution = batch.run(recording, name, imu=index, progress=update)
@@ -102,6 +106,7 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
         print(results.as_json(summary))
         return
     print_summaries(recording.name, {name: summary}, {})
+    say("start: " + ", ".join(f"{key} {value}" for key, value in summary["start"].items()))
     say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
 
 
@@ -130,8 +135,9 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
     from polyins.loading import load
     from polyins.methods import METHODS, find_method
 
-    names = [find_method(name.strip()).name for name in methods.split(",")] if methods else list(METHODS)
+    names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else list(METHODS)
     recording = load(config)
+    results.make_folder(out)
     announce_compilation()
     with progress("compare") as update:
         result = run_all(recording, names, progress=update)
@@ -181,11 +187,12 @@ def simulate(scenario: Path, out: Path, seed: int | None) -> None:
 @out_option("polyins-reproduced")
 @as_json_option
 def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
-    """Reproduce measured or published figures. TARGET: flights, array."""
+    """Reproduce measured or published figures. TARGET: flights, array, consistency."""
     from polyins import results
     from polyins.reproduce import targets
 
     function = targets.find_target(target)
+    results.make_folder(out)
     announce_compilation()
     with progress(target) as update:
         document = function(quick, update)
@@ -282,6 +289,9 @@ def init(files: tuple[Path, ...], out: Path | None) -> None:
     from polyins.io.files import write_bytes
     from polyins.io.propose import propose
 
+    if out is not None and out.parent.resolve() != Path.cwd():
+        # names in a configuration count from its own folder
+        files = tuple(file.resolve() for file in files)
     text = propose(files)
     if out is None:
         click.echo(text)

@@ -73,7 +73,8 @@ class Inputs(NamedTuple):
     fixes: Array
     """(M, 6): position 3, its variance 3"""
     velocities: Array | None
-    """(M, 6): velocity 3, its variance 3; None where the receiver gives none, which spares compiling their update"""
+    """(M, 6): velocity 3, its variance 3, not positive where a fix has none; None, which spares compiling their update,
+    where no fix has one"""
 
 
 class Outputs(NamedTuple):
@@ -258,7 +259,8 @@ def aid(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, velocities: 
     state.counters[0] += 1
     status = aid_by_position(state, plan, inputs.fixes[j], outputs.innovations[j])
     if velocities is not None:
-        if status != REJECTED and not aid_by_velocity(state, plan, velocities[j]):
+        velocity = velocities[j]
+        if status != REJECTED and velocity[3] > 0.0 and not aid_by_velocity(state, plan, velocity):
             status += VELOCITY_REJECTED
     outputs.fix_status[j] = status
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from polyins.comparison import Comparison
+from polyins.errors import InputError
 from polyins.io.files import write_bytes
 from polyins.io.solution_files import write_solution
 from polyins.recording import Recording
@@ -21,6 +22,14 @@ def as_json(document: Document) -> str:
     return json.dumps(document, indent=2, allow_nan=False)
 
 
+def make_folder(folder: Path) -> None:
+    """Make the folder of a command's files before any long work; raise InputError if that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {folder}: cannot be a folder ({error.strerror}); expected a place to write") from error
+
+
 def write_document(path: Path, document: Document) -> None:
     """Write a document as a JSON file."""
     write_bytes(path, (as_json(document) + "\n").encode())
@@ -31,6 +40,7 @@ def write_run(folder: Path, recording: Recording, solution: Solution, summary: D
     write_solution(solution, folder)
     write_document(folder / "summary.json", summary)
     _write_config(folder, recording)
+    (folder / "report.html").unlink(missing_ok=True)  # of an earlier run
     if report:
         from polyins.report.page import write_report
 
@@ -38,18 +48,24 @@ def write_run(folder: Path, recording: Recording, solution: Solution, summary: D
 
 
 def write_comparison(folder: Path, recording: Recording, result: Comparison, report: bool = True) -> None:
-    """Write a folder per method, one per IMU below `single`, and what compares them."""
+    """Write a folder per method and what compares them.
+
+    Below `single`, which holds the first IMU's solution and the figures over all, each IMU has a folder of its name.
+    """
     summaries = result.document["methods"]
     for name, solution in result.solutions.items():
         if name != "single":
             write_solution(solution, folder / name)
             write_document(folder / name / "summary.json", summaries[name])
     if "single" in result.solutions:
+        write_solution(result.solutions["single"], folder / "single")
+        write_document(folder / "single" / "summary.json", summaries["single"])
         for (name, solution), summary in zip(result.each.items(), summaries["single"]["each"], strict=True):
             write_solution(solution, folder / "single" / name)
             write_document(folder / "single" / name / "summary.json", summary)
     write_document(folder / "summary.json", result.document)
     _write_config(folder, recording)
+    (folder / "report.html").unlink(missing_ok=True)  # of an earlier run
     if report:
         from polyins.report.page import write_report
 

@@ -22,7 +22,7 @@ def announce_compilation() -> None:
     from polyins.kernels.jit import CACHE_FOLDER
 
     if not any(CACHE_FOLDER.glob("**/*.nbc")):
-        say("polyins: the first run compiles its kernels, which takes about 20 s; later runs load them")
+        say("polyins: the first run compiles its kernels, which takes about half a minute; later runs load them")
 
 
 @contextmanager
@@ -45,7 +45,8 @@ def progress(label: str) -> Iterator[Callable[[float], None]]:
     try:
         yield update
     finally:
-        bar.stop()
+        if bar.live.is_started:
+            bar.stop()
 
 
 def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
@@ -55,10 +56,12 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
 
     console = Console(soft_wrap=False)
     if not console.is_terminal:
-        console.width = NARROWEST
+        console.width = WIDTH
     table = Table(title=title, title_justify="left")
     for number, column in enumerate(columns):
-        table.add_column(column, justify="right" if number else "left", no_wrap=True)
+        cells = [line for row in [columns, *rows] for line in row[number].splitlines()]
+        narrowest = max(map(len, cells)) if number else None  # a figure is never cut
+        table.add_column(column, justify="right" if number else "left", min_width=narrowest)
     for row in rows:
         table.add_row(*row)
     console.print(table)
@@ -69,8 +72,8 @@ def number(value: float | None, digits: int = 2) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-NARROWEST = 116
-"""columns of text that a table is given where the output is no terminal"""
+WIDTH = 140
+"""columns of text that a table may take where the output is no terminal"""
 
 FIGURES = (
     ("outages\nmax, m", ("outages", "horizontal_max_rms_m"), 2),
@@ -98,5 +101,9 @@ def print_summaries(title: str, summaries: Mapping[str, Mapping[str, Any]], rati
         rows.append(row)
     columns = ["method", *(label for label, _, _ in FIGURES)] + (["ratio to\nsingle"] if ratios else [])
     print_table(title, columns, rows)
+    for name, summary in summaries.items():
+        gnss = summary["gnss"]
+        if gnss["rejected"]:
+            say(f"{name}: {gnss['rejected']} of {gnss['fixes']} GNSS fixes rejected")
     for text in dict.fromkeys(text for summary in summaries.values() for text in summary["warnings"]):
         say(f"warning: {text}")

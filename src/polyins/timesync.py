@@ -38,7 +38,7 @@ class Aligned:
 
 
 def align(streams: tuple[ImuStream, ...]) -> Aligned:
-    """Bring the streams onto the time stamps of the first one, within their common span.
+    """Bring the streams onto the time stamps of the first one without gaps, within their common span.
 
     The increments of the others are interpolated as running sums, so that no rotation or velocity is lost or counted
     twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one, the mean
@@ -73,7 +73,8 @@ def _common_time(streams: tuple[ImuStream, ...]) -> Array:
     if end - begin < 2.0:
         spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
         raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
-    base = streams[0].time
+    # the first whose gaps are few: a gap in the base is one for all
+    base = min(streams, key=lambda stream: len(_gaps(stream.time))).time
     common: Array = base[(base >= begin) & (base <= end)]
     return common
 

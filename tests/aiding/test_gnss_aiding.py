@@ -57,7 +57,7 @@ def with_error(dx: Array, on_earth: bool) -> Array:
 
 
 def fix_at_place() -> Array:
-    return np.concatenate([PLACE, MEASURED, np.ones(6)])
+    return np.concatenate([PLACE, np.ones(3)])
 
 
 def residual_of_position(dx: Array, on_earth: bool) -> Array:
@@ -71,7 +71,9 @@ def residual_of_position(dx: Array, on_earth: bool) -> Array:
 
 def residual_of_velocity(dx: Array, on_earth: bool) -> Array:
     m = np.zeros(kalman.SIZE)
-    gnss.velocity_residuals(with_error(dx, on_earth)[None], LANE, LANE + 1, fix_at_place(), DT, m)
+    gnss.velocity_residuals(
+        with_error(dx, on_earth)[None], LANE, LANE + 1, np.concatenate([MEASURED, np.ones(3)]), DT, m
+    )
     return m[kalman.RESIDUAL : kalman.RESIDUAL + 3].copy()
 
 

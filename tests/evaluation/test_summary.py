@@ -130,7 +130,7 @@ def test_pooled_warnings_and_rejections_are_each_told_once():
     truth = drive()
     each = [summarize(drifting(truth, "single", 1, 0.1, (), seed), reference(truth)) for seed in (1, 2)]
     single = comparison({}, each)["methods"]["single"]
-    assert single["gnss"]["rejected"] == 2.0
+    assert single["gnss"]["rejected"] == 4
     assert single["gnss"]["rejected_times_s"] == each[0]["gnss"]["rejected_times_s"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
@@ -25,7 +26,7 @@ class Filter(Section):
     """a fix whose normalized innovation squared exceeds this is rejected; null: none is"""
     gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = FilterOptions.gate_reopen_after
     """after that many rejections in a row the next fix is believed"""
-    gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0)] = FilterOptions.gnss_snap
+    gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0, le=0.1)] = FilterOptions.gnss_snap
     """a fix nearer than this to an IMU epoch is applied at that epoch, s"""
     gravity_m_s2: Positive = FilterOptions.gravity
     """on a local tangent plane only, m/s^2"""
@@ -72,6 +73,8 @@ class Config(Section):
         for index, name in enumerate(names):
             if name in names[:index]:
                 raise ValueError(f"imus: two are named {name!r}; expected a name of its own for each")
+            if not re.fullmatch(r"\w[\w .+-]*", name):
+                raise ValueError(f"imus: one is named {name!r}; expected letters, digits, blanks, and . _ + -")
         return self
 
 

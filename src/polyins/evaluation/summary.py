@@ -89,7 +89,7 @@ def pooled(each: Sequence[Document]) -> Document:
         "outages": _pooled_outages([summary["outages"] for summary in each]),
         **{key: _means([summary[key] for summary in each]) for key in ("drift", "consistency")},
         "gnss": {
-            **_means([{key: summary["gnss"][key] for key in GNSS_COUNTS} for summary in each]),
+            **{key: sum(summary["gnss"][key] for summary in each) for key in GNSS_COUNTS},
             "rejected_times_s": sorted({time for summary in each for time in summary["gnss"]["rejected_times_s"]}),
         },
         "warnings": list(dict.fromkeys(warning for summary in each for warning in summary["warnings"])),

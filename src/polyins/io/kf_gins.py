@@ -90,8 +90,8 @@ def write_gnss(path: str | Path, stream: GnssStream) -> None:
 
 
 def is_text(content: bytes) -> bool:
-    """Tell text from binary by the first bytes: text has no control characters but blanks."""
-    return all(byte in b"\t\n\r\f" or 32 <= byte < 127 for byte in content[:512])
+    """Tell text, of whatever encoding, from binary by the first bytes: it has no control characters but blanks."""
+    return all(byte in b"\t\n\r\f" or byte >= 32 for byte in content[:512])
 
 
 def _radians(rows: Array, columns: int) -> Array:

@@ -100,6 +100,8 @@ def read_reference(entry: ReferenceEntry, document: Document, span: Span) -> tup
     track, warnings = _track(entry, "reference", document)
     if entry.position_lag_s:
         track = _at_position_times(track, entry.position_lag_s)
+    if len(track.time) < 2:
+        raise InputError(f"{track.source.path}: {len(track.time)} row of reference; expected at least two")
     warnings += checks.check_within(track.source, "reference", track.time, span)
     with document.at(["reference", "point_m"]):
         check_lever_arm("point", np.array(entry.point_m))

@@ -8,7 +8,6 @@ from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, kernel
 
-
 # field of the bank, place in the share, how many
 MEASUREMENTS = ((bank.DTHETA, share.RATE, 3), (bank.DVEL, share.FORCE, 3))
 STATES = (

@@ -44,7 +44,9 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
         for seed in range(seeds):
             document = compare(simulate(scenario, seed=seed), ("single", *METHODS), progress=update).document
             for method, values in figures.items():
-                values.append(figure(document["methods"][method]) or np.nan)
+                value = figure(document["methods"][method])
+                assert value is not None  # there are outages and a reference
+                values.append(value)
             done += 1
         results[name] = _figures(figures)
     return {
