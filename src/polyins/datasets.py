@@ -116,12 +116,13 @@ def _download(name: str, address: str) -> Path:
     import pooch
 
     folder = _cache_folder(name)
+    pooch.get_logger().setLevel("ERROR")
     store = pooch.create(folder, address, registry=_registry(name), retry_if_failed=RETRIES)
     for path in store.registry:
         try:
             store.fetch(path)
         except (OSError, ValueError) as error:
-            reason = str(error).splitlines()[0]
+            reason = str(error).splitlines()[0][:60]
             raise InputError(
                 f"data set {name}: {address}{path} cannot be had ({reason}); expected it there, or the data set as "
                 f"{name} in the folder that POLYINS_DATA names"
