@@ -69,8 +69,8 @@ def demo(out: Path) -> None:
     from polyins.simulation import files, scenario
 
     say("simulating a drive with 16 IMUs and GNSS ...")
-    recording = scenario.simulate(scenario.demo())
-    config = files.write(recording, out / "recording")
+    with progress("simulating"):
+        config = files.write(scenario.simulate(scenario.demo()), out / "recording")
     say(f"recording: {config}")
     _compare(config, None, out, as_json=False, report=True)
 
@@ -93,7 +93,8 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
         find_method(method)
     if imu is not None and method not in (None, "single"):
         raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
-    recording = load(config)
+    with progress("reading"):
+        recording = load(config)
     name = method or ("enav-fusion" if len(recording.imus) > 1 and imu is None else "single")
     index = _imu_index([one.name for one in recording.rig.imus], imu)
     results.make_folder(out)
@@ -101,7 +102,8 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     with progress(name) as update:
         solution = batch.run(recording, name, imu=index, progress=update)
     summary = summarize(solution, recording.reference, recording.outages)
-    results.write_run(out, recording, solution, summary, report=not no_report)
+    with progress("writing"):
+        results.write_run(out, recording, solution, summary, report=not no_report)
     if as_json:
         print(results.as_json(summary))
         return
@@ -136,12 +138,14 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
     from polyins.methods import METHODS, find_method
 
     names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else list(METHODS)
-    recording = load(config)
+    with progress("reading"):
+        recording = load(config)
     results.make_folder(out)
     announce_compilation()
     with progress("compare") as update:
         result = run_all(recording, names, progress=update)
-    results.write_comparison(out, recording, result, report=report)
+    with progress("writing"):
+        results.write_comparison(out, recording, result, report=report)
     if as_json:
         print(results.as_json(result.document))
         return
@@ -178,7 +182,9 @@ def simulate(scenario: Path, out: Path, seed: int | None) -> None:
     from polyins.simulation import files
     from polyins.simulation.scenario import simulate as drive
 
-    say(f"configuration: {files.write(drive(scenario, seed=seed), out)}")
+    with progress("simulating"):
+        config = files.write(drive(scenario, seed=seed), out)
+    say(f"configuration: {config}")
 
 
 @cli.command()

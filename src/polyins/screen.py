@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-import time
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -27,24 +27,25 @@ def announce_compilation() -> None:
 
 @contextmanager
 def progress(label: str) -> Iterator[Callable[[float], None]]:
-    """Give a function that takes the share done; a bar appears when the work takes longer than a second."""
+    """Give a function that takes the share done; on a terminal a bar appears when the work takes over a second.
+
+    Until the first call, and in work that never calls it, the bar only shows that something goes on.
+    """
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    columns = (TextColumn(label), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     bar = Progress(*columns, console=console, transient=True)
-    task = bar.add_task(label, total=1.0)
-    begin = time.monotonic()
-
-    def update(share: float) -> None:
-        bar.update(task, completed=share)
-        if not bar.live.is_started and time.monotonic() - begin > SOON and console.is_terminal:
-            bar.start()
-
+    task = bar.add_task(label, total=None)
+    timer = threading.Timer(SOON, bar.start)
+    timer.daemon = True
+    if console.is_terminal:
+        timer.start()
     try:
-        yield update
+        yield lambda share: bar.update(task, total=1.0, completed=share)
     finally:
+        timer.cancel()
         if bar.live.is_started:
             bar.stop()
 
