@@ -219,11 +219,11 @@ def _through_navigation(g: Array, dt: float) -> None:
 
 
 @kernel
-def _put_c(g: Array, i: int, j: int, half: float) -> None:
-    """Element of W = A C + G B / 2 and of the new C = (A C + G B) D."""
-    w = g[T + i * STRIDE + SENSORS + j] + half
-    g[W + i * HALF + j] = w
-    g[P + i * STRIDE + SENSORS + j] = g[FACTOR + SENSORS + j] * (w + half)
+def _put_c(g: Array, row: int, half_row: int, j: int, half: float) -> None:
+    """Element of W = A C + G B / 2 and of the new C = (A C + G B) D, in the rows that begin at these offsets."""
+    w = g[T + row + SENSORS + j] + half
+    g[W + half_row + j] = w
+    g[P + row + SENSORS + j] = g[FACTOR + SENSORS + j] * (w + half)
 
 
 @kernel
@@ -232,12 +232,12 @@ def _half(f: Three, b: Three, h: Three, s: Three) -> float:
 
 
 @kernel
-def _decay(g: Array, k: int, j: int, factors: Three, b: Three) -> None:
-    """Three rows of B <- D B D."""
+def _decay(g: Array, row: int, j: int, factors: Three, b: Three) -> None:
+    """Three rows of B <- D B D, from the one that begins at this offset on."""
     factor = g[FACTOR + SENSORS + j]
-    g[P + k * STRIDE + SENSORS + j] = factors[0] * factor * b[0]
-    g[P + (k + 1) * STRIDE + SENSORS + j] = factors[1] * factor * b[1]
-    g[P + (k + 2) * STRIDE + SENSORS + j] = factors[2] * factor * b[2]
+    g[P + row + SENSORS + j] = factors[0] * factor * b[0]
+    g[P + row + STRIDE + SENSORS + j] = factors[1] * factor * b[1]
+    g[P + row + 2 * STRIDE + SENSORS + j] = factors[2] * factor * b[2]
 
 
 @kernel
@@ -256,19 +256,19 @@ def _through_sensors(g: Array, dt: float) -> None:
         a = _column(g, P + _A * STRIDE + SENSORS + j, STRIDE)
         sb = _column(g, P + _GS * STRIDE + SENSORS + j, STRIDE)
         sa = _column(g, P + _AS * STRIDE + SENSORS + j, STRIDE)
-        _put_c(g, 0, j, 0.0)
-        _put_c(g, 1, j, 0.0)
-        _put_c(g, 2, j, 0.0)
-        _put_c(g, 3, j, _half(f3, a, h3, sa))
-        _put_c(g, 4, j, _half(f4, a, h4, sa))
-        _put_c(g, 5, j, _half(f5, a, h5, sa))
-        _put_c(g, 6, j, _half(f6, b, h6, sb))
-        _put_c(g, 7, j, _half(f7, b, h7, sb))
-        _put_c(g, 8, j, _half(f8, b, h8, sb))
-        _decay(g, _G, j, d_b, b)
-        _decay(g, _A, j, d_a, a)
-        _decay(g, _GS, j, d_sb, sb)
-        _decay(g, _AS, j, d_sa, sa)
+        _put_c(g, 0 * STRIDE, 0 * HALF, j, 0.0)
+        _put_c(g, 1 * STRIDE, 1 * HALF, j, 0.0)
+        _put_c(g, 2 * STRIDE, 2 * HALF, j, 0.0)
+        _put_c(g, 3 * STRIDE, 3 * HALF, j, _half(f3, a, h3, sa))
+        _put_c(g, 4 * STRIDE, 4 * HALF, j, _half(f4, a, h4, sa))
+        _put_c(g, 5 * STRIDE, 5 * HALF, j, _half(f5, a, h5, sa))
+        _put_c(g, 6 * STRIDE, 6 * HALF, j, _half(f6, b, h6, sb))
+        _put_c(g, 7 * STRIDE, 7 * HALF, j, _half(f7, b, h7, sb))
+        _put_c(g, 8 * STRIDE, 8 * HALF, j, _half(f8, b, h8, sb))
+        _decay(g, _G * STRIDE, j, d_b, b)
+        _decay(g, _A * STRIDE, j, d_a, a)
+        _decay(g, _GS * STRIDE, j, d_sb, sb)
+        _decay(g, _AS * STRIDE, j, d_sa, sa)
 
 
 @kernel
