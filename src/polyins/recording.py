@@ -102,8 +102,8 @@ class FilterOptions:
     """What the filter is told beyond the rig."""
 
     gate_limit: float | None = 100.0
-    """A fix is rejected whose normalized innovation squared exceeds this; None: no gate. Ten sigma: what the errors of
-    real IMUs beyond their model make of good fixes after an outage stays below."""
+    """A fix is rejected whose normalized innovation squared exceeds this; None: no gate. Ten sigma: errors within the
+    model never reach it, but IMUs with errors beyond it can make good fixes exceed it after an outage."""
     gate_reopen_after: int = 3
     """After that many rejections in a row the next fix is believed and the covariance grows to match."""
     gnss_snap: float = 1e-4
