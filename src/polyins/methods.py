@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from polyins.errors import InputError
+
+ALL = 1_000_000
+"""as many as there are"""
+
+CENTRALIZED = "centralized"
 
 
 @dataclass(frozen=True)
@@ -14,12 +19,28 @@ class Method:
     """One row of the table."""
 
     name: str
-    bank: Literal["one", "mean", "all"]
-    """one IMU; one virtual IMU, the mean of all moved to the array origin; or all IMUs side by side"""
-    shares: Literal["each", "all"] = "each"
-    """{1} {2} ... {N}: a covariance block for each; or {1 2 ... N}: one block for all"""
+    bank: Literal["one", "mean", "all", "rolling"]
+    """one IMU; one virtual IMU, the mean of all moved to the array origin; all IMUs side by side; or modules on wheels
+    and body, aided by wheel speed"""
+    shares: Literal["each", "all", "module"] = "each"
+    """{1} {2} ... {N}: a covariance block for each; {1 2 ... N}: one block for all; or one block for each module"""
     shared_mechanization: bool = False
     """compute the intermediates of each mechanization from the fused attitude, velocity and position"""
+    wheels: int = 0
+    """modules on wheels that give speed"""
+    bodies: int = 0
+    """modules on the body"""
+    wheels_navigate: bool = True
+    """whether the modules on wheels are in the bank, besides giving speed"""
+    joined: bool = False
+    """[{1} {2} ...]: the blocks keep their cross-covariances"""
+    chosen: tuple[str, ...] = ()
+    """names of the IMUs or modules to prefer, where there are more than the method takes"""
+
+    @property
+    def rolling(self) -> bool:
+        """Whether wheels aid it."""
+        return self.bank == "rolling"
 
 
 METHODS = {
@@ -30,14 +51,29 @@ METHODS = {
         Method("nav-fusion", bank="all"),
         Method("enav-fusion", bank="all", shares="all"),
         Method("enav-fusion-shared-mechanization", bank="all", shares="all", shared_mechanization=True),
+        Method("wheel-ins", bank="rolling", shares="module", wheels=1),
+        Method("body-ins", bank="rolling", shares="module", wheels=1, bodies=1, wheels_navigate=False),
+        Method("dual-wheel-ins", bank="rolling", shares="module", wheels=2),
+        Method("body-wheel-ins", bank="rolling", shares="module", wheels=1, bodies=1),
+        Method("triple-ins", bank="rolling", shares="module", wheels=2, bodies=1),
+        Method("multi-wheel-ins", bank="rolling", shares="module", wheels=ALL, bodies=ALL),
     )
 }
 
 
 def find_method(name: str) -> Method:
-    """Return the row of that name; raise InputError with the nearest known one otherwise."""
-    if name in METHODS:
-        return METHODS[name]
-    near = difflib.get_close_matches(name, METHODS, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else "known: " + ", ".join(METHODS)
-    raise InputError(f"method: {name!r} is unknown; {hint}")
+    """Return the row of that name; raise InputError with the nearest known one otherwise.
+
+    Of a method with wheels, `/` may be followed by IMUs or modules to choose and by `centralized`, as in
+    `body-wheel-ins/IMU4` or `triple-ins/centralized`.
+    """
+    base, *words = name.split("/")
+    if base not in METHODS:
+        near = difflib.get_close_matches(base, METHODS, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else "known: " + ", ".join(METHODS)
+        raise InputError(f"method: {name!r} is unknown; {hint}")
+    row = METHODS[base]
+    if words and not row.rolling:
+        raise InputError(f"method: {name!r}; expected nothing after {base!r}")
+    chosen = tuple(word for word in words if word != CENTRALIZED)
+    return replace(row, name=name, joined=CENTRALIZED in words, chosen=chosen)

@@ -98,6 +98,29 @@ class StartOptions:
 
 
 @dataclass(frozen=True)
+class RollingOptions:
+    """How wheels aid the filter; the values are paper B's (Table IX)."""
+
+    speed_interval: float = 0.5
+    """s, from one update by wheel speed and nonholonomic constraint to the next"""
+    speed_window: float = 0.1
+    """s: the speed is the mean over this time before the update"""
+    predict: str = "window"
+    """what the measured mean speed is compared with: the mean velocity over the same window, or with "end" the velocity
+    at its end, which is half a window late"""
+    wheel_speed_std: Vector = field(default_factory=lambda: np.array([0.03, 0.02, 0.02]))
+    """m/s forward, right, down, for IMUs on wheels"""
+    body_speed_std: Vector = field(default_factory=lambda: np.array([0.05, 0.04, 0.04]))
+    """m/s forward, right, down, for IMUs on the body"""
+    constraint_interval: float = 1.0
+    """s, from one update by the reference point to the next"""
+    constraint_std: float = 0.2
+    """m, of each component of the reference point"""
+    standstill: bool = True
+    """look for standstills and update by zero velocity and zero rate there"""
+
+
+@dataclass(frozen=True)
 class FilterOptions:
     """What the filter is told beyond the rig."""
 
@@ -110,6 +133,7 @@ class FilterOptions:
     """s: a fix nearer than this to an IMU epoch is applied at that epoch; otherwise the interval is split."""
     gravity: float = 9.80665
     """m/s^2, on a local tangent plane only."""
+    rolling: RollingOptions = RollingOptions()
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ PPM = 1e-6
 HOUR = 3600.0
 
 MAX_LEVER_ARM_M = 100.0
+MAX_RADIUS_M = 5.0
 
 
 def _vector(value: ArrayLike) -> Vector:
@@ -130,18 +131,49 @@ class ImuErrors:
 
 
 @dataclass(frozen=True)
+class Wheel:
+    """The wheel that an IMU turns with. The module's axes: x along the axle to the right, y and z in the wheel."""
+
+    radius: float
+    """m: rolling forward, speed = -radius x rate about x, as the gyro shows it less its bias at the start"""
+    lever_arm: Vector = field(default_factory=zero_vector)
+    """from the IMU to the wheel's centre, m, in the module's axes"""
+    steering: bool = False
+    """its heading is not the vehicle's: it gives no speed and does not navigate"""
+    radius_std: float = 0.0
+    """relative; above zero the filter estimates the radius"""
+    lever_arm_std: float = 0.0
+    """m, of both components in the wheel; above zero the filter estimates them"""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.radius <= MAX_RADIUS_M:
+            raise InputError(f"wheel: radius is {self.radius:g} m; expected more than 0 and at most {MAX_RADIUS_M:g} m")
+        check_lever_arm("wheel: lever arm", self.lever_arm)
+
+
+@dataclass(frozen=True)
 class Imu:
-    """One IMU: its name, its mount and what is known of its errors."""
+    """One IMU: its name, its mount and what is known of its errors.
+
+    On a rig with wheels the array frame is the vehicle frame v, forward-right-down from the middle of the rear axle.
+    """
 
     name: str
     noise: NoiseGrade
     rotation: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
-    """C_ab, shape (3, 3): maps vectors from the sensor's axes to the array's. Readers apply it."""
+    """C_ab, shape (3, 3): maps vectors from the sensor's axes to the array's, on a wheel to the module's. Readers apply
+    it."""
     position: Vector = field(default_factory=zero_vector)
-    """Where it sits in the array frame, m, from the array origin."""
+    """Where it sits in the array frame, m, from the array origin; on a wheel: where the wheel's centre is."""
     initial_errors: ImuErrors = field(default_factory=ImuErrors)
     initial_std: ImuErrors | None = None
     """How sure `initial_errors` is; None: the noise grade's steady-state values."""
+    wheel: Wheel | None = None
+    """None: it is fixed to the body"""
+    module: str = ""
+    """of the board that it shares with other chips at the same place; without one it is a module of its own"""
+    mount_std: float = 0.0
+    """rad, of pitch and yaw of an IMU on a vehicle's body; above zero the filter estimates them"""
 
     def __post_init__(self) -> None:
         check_lever_arm(f"IMU {self.name}: position", self.position)
@@ -171,6 +203,18 @@ class Rig:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"imus: two IMUs are named {name!r}; expected a name of its own for each")
+
+    @property
+    def rolling(self) -> bool:
+        """Whether there is an IMU on a wheel."""
+        return any(imu.wheel is not None for imu in self.imus)
+
+    def modules(self) -> dict[str, list[int]]:
+        """Return the indices of the IMUs of each module, by the module's name."""
+        found: dict[str, list[int]] = {}
+        for index, imu in enumerate(self.imus):
+            found.setdefault(imu.module or imu.name, []).append(index)
+        return found
 
     def subset(self, indices: Iterable[int]) -> Rig:
         """Return the rig with just the IMUs of those indices."""
