@@ -50,11 +50,14 @@ class Start:
     """shape (N, 12)"""
     sources: dict[str, str]
     """what was used for each of them, in words"""
+    imu_attitudes: Array | None = None
+    """roll, pitch, heading of each IMU of a rig with wheels, rad, shape (N, 3)"""
 
 
 def find_start(recording: Recording, aligned: Aligned) -> Start:
     """Find the start of a recording whose IMUs are on one time base; raise InputError where nothing gives it."""
-    return _Search(recording, aligned).run()
+    search = _RollingSearch if recording.rig.rolling else _Search
+    return search(recording, aligned).run()
 
 
 class _Search:
@@ -287,6 +290,61 @@ class _Search:
         self.errors[:, :3] += rate
         for i, imu in enumerate(self.recording.rig.imus):
             # white noise over the standstill, and a tenth of the grade for what the bias does afterwards
+            self.error_std[i, :3] = np.hypot(
+                imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std
+            )
+        self.sources["gyro_bias"] = f"mean of {duration:.1f} s at standstill"
+
+
+class _RollingSearch(_Search):
+    """The start of a vehicle with wheels, at a standstill: each IMU is levelled by itself.
+
+    The array's attitude is that of the vehicle; an IMU on a wheel looks along the axle, to the right.
+    """
+
+    imu_attitudes: Array
+
+    def run(self) -> Start:
+        start = super().run()
+        return replace(start, imu_attitudes=self.imu_attitudes)
+
+    def _roll_pitch(
+        self, time: float, still: tuple[float, float] | None, velocity: Array
+    ) -> tuple[tuple[float, float], float]:
+        imus = self.recording.rig.imus
+        self.imu_attitudes = np.zeros((len(imus), 3))
+        given = self.options.roll_pitch
+        if given is not None:
+            self.sources["roll_pitch"] = "given"
+            self.imu_attitudes[:, :2] = given
+        elif still:
+            self.sources["roll_pitch"] = "levelled at standstill"
+            for i, force in enumerate(self._mean(*still)[1]):
+                self.imu_attitudes[i, :2] = level(force)
+        else:
+            raise InputError(
+                "start: no standstill of three seconds; a vehicle with wheels starts at one:"
+                " expected start.static_interval_s or start.roll_pitch_deg"
+            )
+        bodies = [i for i, imu in enumerate(imus) if imu.wheel is None]
+        roll, pitch = self.imu_attitudes[bodies[0], :2] if bodies else (0.0, 0.0)
+        return (float(roll), float(pitch)), 0.5 * DEG
+
+    def _heading(
+        self, time: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float], velocity: Array
+    ) -> tuple[float, float]:
+        heading, std = super()._heading(time, still, roll_pitch, velocity)
+        on_wheel = np.array([imu.wheel is not None for imu in self.recording.rig.imus])
+        # the heading of an axle that is tilted by roll and pitch differs from the vehicle's plus 90 degrees
+        axle = rotation_matrix(np.array([*roll_pitch, heading]))[:, 1]
+        self.imu_attitudes[:, 2] = np.where(on_wheel, np.arctan2(axle[1], axle[0]), heading)
+        return heading, std
+
+    def _gyro_biases(self, still: tuple[float, float], attitude: Array, position: Array) -> None:
+        rates, _, duration = self._mean(*still)
+        for i, imu in enumerate(self.recording.rig.imus):
+            turning = rotation_matrix(self.imu_attitudes[i]).T @ earth_rate(position, self.recording.geodetic)
+            self.errors[i, :3] += rates[i] - turning
             self.error_std[i, :3] = np.hypot(
                 imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std
             )

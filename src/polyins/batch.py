@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins import alignment, engine, timesync
+from polyins import alignment, engine, modules, timesync
+from polyins.aiding.wheels import Joint, Rolling
 from polyins.alignment import Start
 from polyins.engine import Inputs, Outputs, Plan, State
 from polyins.errors import InputError
@@ -17,6 +18,7 @@ from polyins.geodesy import metres_per_unit
 from polyins.kernels import bank, dense, kalman, share
 from polyins.kernels.bank import LANES
 from polyins.methods import Method, find_method
+from polyins.modules import Modules
 from polyins.recording import Recording
 from polyins.rig import Imu, NoiseGrade, Rig
 from polyins.solution import Innovations, Solution
@@ -55,10 +57,16 @@ class Prepared:
     outputs: Outputs
     work: tuple[Array, Array] | None
     """of the dense covariance"""
+    modules: Modules | None
+    """of a rig with wheels"""
+    rolling: Rolling | None
+    joined: Joint | None
 
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
-        engine.run_epochs(self.state, self.plan, self.inputs, self.outputs, first, last, self.work)
+        engine.run_epochs(
+            self.state, self.plan, self.inputs, self.outputs, first, last, self.work, self.rolling, self.joined
+        )
 
 
 def run(
@@ -98,12 +106,17 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
         if not 0 <= imu < len(recording.imus):
             raise InputError(f"imu: {imu} is not an index of {len(recording.imus)} IMUs; they count from 0")
         recording = recording.subset([imu])
-    aligned = timesync.align(recording.imus)
+    chosen = modules.choose(row, recording.rig) if row.rolling else None
+    if chosen:
+        recording = recording.subset(chosen.all)
+    aligned = timesync.align(recording.imus, bridge=not row.rolling)
     start = alignment.find_start(recording, aligned)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
     if len(aligned.time) < 2:
         raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")
+    if chosen:
+        return _prepare_rolling(row, recording, chosen, aligned, start, dense_covariance)
     members = _members(row, recording.rig, start)
     plan, inputs = build_plan(row, recording, aligned), build_inputs(recording, aligned)
     return Prepared(
@@ -117,6 +130,60 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
         inputs=inputs,
         outputs=build_outputs(len(aligned.time), len(inputs.fix_time), len(members), plan.log_every),
         work=dense.workspace() if dense_covariance else None,
+        modules=None,
+        rolling=None,
+        joined=None,
+    )
+
+
+def _prepare_rolling(
+    row: Method, recording: Recording, chosen: Modules, aligned: Aligned, start: Start, dense_covariance: bool
+) -> Prepared:
+    spans, order = modules.lanes(chosen)
+    imus = recording.rig.imus
+    members = [
+        Member(imus[i], start.imu_errors[i], start.imu_error_std[i], -imus[i].position, np.zeros(3)) for i in order
+    ]
+    rolling = modules.rolling(chosen, spans, recording, aligned, start.imu_errors[:, :3])
+    joined = modules.joined(len(spans)) if row.joined else None
+    plan = build_plan(row, recording, aligned)
+    inputs = build_inputs(recording, replace(aligned, increments=aligned.increments[:, :, order]))
+    speed = [imus[chosen.all.index(module[0])] for module in chosen.speed]
+    blocks = np.zeros(((len(order) + LANES - 1) // LANES, bank.SIZE))
+    blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
+    assert start.imu_attitudes is not None
+    for lane, i in enumerate(order):
+        modules.fill_lane(
+            blocks[lane // LANES],
+            lane % LANES,
+            imus[i],
+            start,
+            start.imu_attitudes[i],
+            start.imu_errors[i],
+            recording.geodetic,
+        )
+    groups = np.zeros((len(spans) + 1, share.SIZE))
+    for g, (first, last) in zip(groups, spans, strict=False):
+        g[share.WEIGHTS] = last - first
+        _fill_share(g, members[first:last], start, recording.rig)
+        for k, std in enumerate(modules.mounting_std(members[first].imu, speed)):
+            g[share.P + (share.INERTIAL + k) * (share.STRIDE + 1)] = std**2
+    state = _state(recording, blocks, groups, spans, start, inputs)
+    engine.begin(state, plan, inputs.increments[0], state.clock[1], rolling)
+    return Prepared(
+        method=row,
+        recording=recording,
+        aligned=aligned,
+        start=start,
+        members=members,
+        state=state,
+        plan=plan,
+        inputs=inputs,
+        outputs=build_outputs(len(aligned.time), len(inputs.fix_time), len(order), plan.log_every, errors=15),
+        work=dense.workspace() if dense_covariance else None,
+        modules=chosen,
+        rolling=rolling,
+        joined=joined,
     )
 
 
@@ -150,20 +217,26 @@ def build_state(
     for g, (first, last) in zip(groups, spans, strict=False):
         g[share.WEIGHTS] = (last - first) / count
         _fill_share(g, members[first:last], start, recording.rig)
+    state = _state(recording, blocks, groups, spans, start, inputs)
+    engine.begin(state, plan, inputs.increments[0], interval)
+    return state
+
+
+def _state(
+    recording: Recording, blocks: Array, groups: Array, spans: list[tuple[int, int]], start: Start, inputs: Inputs
+) -> State:
     near = np.array([float(recording.geodetic), 0.0, 0.0, 1.0, recording.options.gravity])
     engine.move_near(near, start.position[0])
-    state = State(
+    return State(
         blocks=blocks,
         groups=groups,
         members=np.array(spans, dtype=np.int64),
         measurements=np.zeros((len(spans), kalman.SIZE)),
         near=near,
         before=np.zeros(4),
-        clock=np.array([start.time, interval]),
+        clock=np.array([start.time, inputs.time[1] - inputs.time[0]]),
         counters=np.zeros(3, dtype=np.int64),
     )
-    engine.begin(state, plan, inputs.increments[0], interval)
-    return state
 
 
 def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, geodetic: bool) -> None:
@@ -186,6 +259,7 @@ def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, g
 
 def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None:
     """Give a share the noise of its mean member."""
+    g[share.FACTOR + share.INERTIAL : share.FACTOR + share.STATES] = 1.0
     noise = NoiseGrade.typical([member.imu.noise for member in members])
     std = np.sqrt(np.mean([member.start_error_std**2 for member in members], axis=0))
     variances = np.concatenate([start.position_std, start.velocity_std, start.attitude_std, std]) ** 2
@@ -227,8 +301,8 @@ def build_inputs(recording: Recording, aligned: Aligned) -> Inputs:
     return Inputs(aligned.time, np.ascontiguousarray(aligned.increments), gnss.time[shown], fixes, velocities)
 
 
-def build_outputs(epochs: int, fixes: int, imus: int, log_every: int) -> Outputs:
-    """Return empty arrays for what a run writes."""
+def build_outputs(epochs: int, fixes: int, imus: int, log_every: int, errors: int = 12) -> Outputs:
+    """Return empty arrays for what a run writes; `errors` are the slow ones that are logged."""
     log_rows = (epochs - 2) // log_every + 1 if epochs > 1 else 0
     return Outputs(
         states=np.empty((epochs, 10)),
@@ -236,7 +310,7 @@ def build_outputs(epochs: int, fixes: int, imus: int, log_every: int) -> Outputs
         fix_status=np.zeros(fixes, dtype=np.int8),
         innovations=np.zeros((fixes, 7)),
         log_time=np.empty(log_rows),
-        log=np.empty((log_rows, 2, 12, imus)),
+        log=np.empty((log_rows, 2, errors, imus)),
     )
 
 
@@ -245,6 +319,8 @@ def _solution(run: Prepared, filter_s: float, first_call_s: float) -> Solution:
     states, variances = outputs.states[1:], outputs.variances[1:]
     point = recording.rig.imus[0].position if run.method.bank == "one" else np.zeros(3)
     status = outputs.fix_status
+    lanes = [i for first, last in run.state.members for i in range(first, last)]
+    log = outputs.log[:, :, :, lanes].transpose(0, 1, 3, 2)
     return Solution(
         method=run.method.name,
         geodetic=recording.geodetic,
@@ -257,10 +333,10 @@ def _solution(run: Prepared, filter_s: float, first_call_s: float) -> Solution:
         phi_covariance=variances[:, 6:12],
         point=point,
         imus=len(recording.imus),
-        imu_names=tuple(member.imu.name for member in run.members),
+        imu_names=tuple(run.members[i].imu.name for i in lanes),
         imu_error_time=outputs.log_time,
-        imu_errors=outputs.log[:, 0].transpose(0, 2, 1),
-        imu_error_std=outputs.log[:, 1].transpose(0, 2, 1),
+        imu_errors=log[:, 0, :, :12],
+        imu_error_std=log[:, 1, :, :12],
         innovations=Innovations(
             time=run.inputs.fix_time,
             residual=outputs.innovations[:, 0:3],

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from polyins.aiding import gnss
-from polyins.kernels import bank, dense, earth, fuse, kalman, share, strapdown
+from polyins.aiding import gnss, wheels
+from polyins.aiding.wheels import Joint, Rolling
+from polyins.kernels import bank, dense, earth, fuse, joint, kalman, share, strapdown, vehicle
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, kernel
 
@@ -20,6 +21,10 @@ UNUSED, ACCEPTED, REJECTED, REOPENED = 0, 1, 2, 3
 VELOCITY_REJECTED = 4
 """Added where the position of a fix was accepted and its velocity was not."""
 
+
+CAUTION = 4.0
+"""The gate takes the standard deviations of the prediction times this: P knows nothing of misaligned chips and the
+like, which in an outage or a bend make errors of many sigma."""
 
 MOST_GROWTH = 100.0
 """of the covariance when the gate reopens: standard deviations tenfold"""
@@ -91,7 +96,7 @@ class Outputs(NamedTuple):
     log_time: Array
     """(K,)"""
     log: Array
-    """(K, 2, 12, N): IMU errors and their std"""
+    """(K, 2, E, N): slow errors and their std; E is 12, or 15 with those of the mounting"""
 
 
 @kernel
@@ -105,6 +110,8 @@ def propagate(
     fraction: float,
     dt: float,
     work: tuple[Array, Array] | None,
+    rolling: Rolling | None,
+    joined: Joint | None,
 ) -> None:
     """Advance every IMU, every covariance block and the fused states by dt, a fraction of the measured interval.
 
@@ -128,13 +135,21 @@ def propagate(
             share.predict(g, dt)
         else:
             dense.predict(g, dt, work[0], work[1])
+    if joined is not None:
+        for s in range(members.shape[0]):
+            for other in range(s + 1, members.shape[0]):
+                joint.predict(groups, s, other, dt, joined.whole, joined.work)
     for b in range(blocks.shape[0]):
         w = blocks[b]
         strapdown.mechanize(w, dt, ratio, near)
         strapdown.remember(w)
     clock[0] += dt
     clock[1] = dt
-    merge(blocks, groups, members, dt)
+    if rolling is None:
+        merge(blocks, groups, members, dt)
+    else:
+        fuse.fuse_shares(blocks, groups, members, dt)
+        vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
 
 
 @kernel
@@ -159,8 +174,8 @@ def merge(blocks: Array, groups: Array, members: Array, dt: float) -> None:
 
 
 @kernel
-def aid_by_position(state: State, plan: Plan, fix: Array, innovation: Array) -> int:
-    """Update every share by a GNSS position; return what became of it."""
+def _measure_position(state: State, fix: Array) -> float:
+    """Measure a GNSS position with every share; return the mean of their NIS."""
     geodetic = state.near[0] != 0.0
     nis = 0.0
     for s in range(state.members.shape[0]):
@@ -174,17 +189,50 @@ def aid_by_position(state: State, plan: Plan, fix: Array, innovation: Array) -> 
             m[kalman.R + a] = fix[3 + a]
         kalman.gain(g, m)
         nis += kalman.normalized_innovation_squared(m) / state.members.shape[0]
+    return nis
+
+
+@kernel
+def aid_by_position(
+    state: State, plan: Plan, fix: Array, innovation: Array, rolling: Rolling | None, joined: Joint | None
+) -> int:
+    """Update every share by a GNSS position; return what became of it."""
+    blocks, groups, members, measurements = state.blocks, state.groups, state.members, state.measurements
+    if rolling is None:
+        nis = _measure_position(state, fix)
+    elif joined is None:
+        nis = wheels.measure_position_each(fix, blocks, groups, members, measurements, state.near, rolling)
+    else:
+        nis = wheels.measure_position_all(fix, blocks, groups, members, measurements, state.near, rolling, joined)
     _record(state, nis, innovation)
     status = ACCEPTED
-    if not nis <= plan.gate_limit:
+    if not _passes_gate(state, plan, nis):
         state.counters[1] += 1
         if state.counters[1] <= plan.reopen_after:
             return REJECTED
-        _reopen(state, plan, nis)
+        if joined is None:
+            _reopen(state, plan, nis)
+        else:
+            _reopen_all(state, nis, joined)
         status = REOPENED
     state.counters[1] = 0
-    _correct(state)
+    if rolling is None:
+        _correct(state)
+    else:
+        dt = state.clock[1]
+        wheels.correct_by_position(blocks, groups, members, measurements, state.near, rolling, joined, dt)
     return status
+
+
+@kernel
+def _reopen_all(state: State, nis: float, joined: Joint) -> None:
+    """Let the joined covariance grow as `_reopen` lets that of a share."""
+    growth = min(nis / 3.0, MOST_GROWTH)
+    m = state.measurements[0]
+    for i in range(joined.whole.shape[0]):
+        for j in range(joined.whole.shape[0]):
+            joined.whole[i, j] *= growth
+    joint.gain(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, m)
 
 
 @kernel
@@ -200,10 +248,20 @@ def aid_by_velocity(state: State, plan: Plan, fix: Array) -> bool:
             m[kalman.R + a] = fix[3 + a]
         kalman.gain(g, m)
         nis += kalman.normalized_innovation_squared(m) / state.members.shape[0]
-    if not nis <= plan.gate_limit:
+    if not _passes_gate(state, plan, nis):
         return False
     _correct(state)
     return True
+
+
+@kernel
+def _passes_gate(state: State, plan: Plan, nis: float) -> bool:
+    if nis <= plan.gate_limit:
+        return True
+    cautious = 0.0
+    for s in range(state.members.shape[0]):
+        cautious += kalman.cautious_innovation_squared(state.measurements[s], CAUTION) / state.members.shape[0]
+    return cautious <= plan.gate_limit
 
 
 @kernel
@@ -253,11 +311,19 @@ def _correct(state: State) -> None:
 
 
 @kernel
-def aid(state: State, plan: Plan, inputs: Inputs, outputs: Outputs, velocities: Array | None) -> None:
+def aid(
+    state: State,
+    plan: Plan,
+    inputs: Inputs,
+    outputs: Outputs,
+    velocities: Array | None,
+    rolling: Rolling | None,
+    joined: Joint | None,
+) -> None:
     """Apply the next fix to the state as it is."""
     j = state.counters[0]
     state.counters[0] += 1
-    status = aid_by_position(state, plan, inputs.fixes[j], outputs.innovations[j])
+    status = aid_by_position(state, plan, inputs.fixes[j], outputs.innovations[j], rolling, joined)
     if velocities is not None:
         velocity = velocities[j]
         if status != REJECTED and velocity[3] > 0.0 and not aid_by_velocity(state, plan, velocity):
@@ -275,7 +341,7 @@ def load(blocks: Array, raw: Array) -> None:
                 w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
 
 
-def begin(state: State, plan: Plan, raw: Array, interval: float) -> None:
+def begin(state: State, plan: Plan, raw: Array, interval: float, rolling: Rolling | None = None) -> None:
     """Complete a state that holds positions, velocities, quaternions and errors.
 
     The increments that end at the start are the previous ones of the first epoch. Runs once, so it is not compiled.
@@ -297,8 +363,11 @@ def begin(state: State, plan: Plan, raw: Array, interval: float) -> None:
         strapdown.remember(w)
     for s in range(state.members.shape[0]):
         fuse.fuse_measurements(state.blocks, state.members[s, 0], state.members[s, 1], state.groups[s], interval)
-    _gather_idle_lanes(state.blocks, state.members[-1, 1])
-    merge(state.blocks, state.groups, state.members, state.clock[1])
+    _gather_idle_lanes(state.blocks, state.members)
+    if rolling is None:
+        merge(state.blocks, state.groups, state.members, state.clock[1])
+    else:
+        wheels.settle(state.blocks, state.groups, state.members, rolling, state.clock[1])
 
 
 @kernel
@@ -332,18 +401,21 @@ def _log(state: State, outputs: Outputs, time: float) -> None:
     for s in range(state.members.shape[0]):
         g = state.groups[s]
         for i in range(state.members[s, 0], state.members[s, 1]):
-            for k in range(12):
+            for k in range(outputs.log.shape[2]):
                 outputs.log[row, 0, k, i] = state.blocks[i // LANES, bank.ERRORS + k * LANES + i % LANES]
                 outputs.log[row, 1, k, i] = math.sqrt(g[share.P + (9 + k) * (share.STRIDE + 1)])
 
 
 @kernel
-def _gather_idle_lanes(blocks: Array, count: int) -> None:
-    """Put the lanes without an IMU where the last one is: they have weight 0, but would fall for hours otherwise."""
-    for lane in range(count, blocks.shape[0] * LANES):
-        for field in range(0, bank.SIZE, LANES):
-            if field != bank.WEIGHT:
-                blocks[lane // LANES, field + lane % LANES] = blocks[(count - 1) // LANES, field + (count - 1) % LANES]
+def _gather_idle_lanes(blocks: Array, members: Array) -> None:
+    """Put the lanes without an IMU where the last one before them is: they would fall for hours otherwise."""
+    for s in range(members.shape[0]):
+        last = members[s, 1] - 1
+        end = members[s + 1, 0] if s + 1 < members.shape[0] else blocks.shape[0] * LANES
+        for lane in range(last + 1, end):
+            for field in range(0, bank.SIZE, LANES):
+                if field != bank.WEIGHT:
+                    blocks[lane // LANES, field + lane % LANES] = blocks[last // LANES, field + last % LANES]
 
 
 @kernel
@@ -355,6 +427,8 @@ def run_epochs(
     first: int,
     last: int,
     work: tuple[Array, Array] | None,
+    rolling: Rolling | None,
+    joined: Joint | None,
 ) -> None:
     """Take epochs first ... last - 1; the first of a recording is 1, since epoch 0 is the start.
 
@@ -377,15 +451,21 @@ def run_epochs(
         while next_fix < end - snap:
             if next_fix > now + snap:
                 dt = next_fix - now
-                propagate(blocks, groups, members, near, clock, shared, dt / interval, dt, work)
+                propagate(blocks, groups, members, near, clock, shared, dt / interval, dt, work, rolling, joined)
                 now = next_fix
-            aid(state, plan, inputs, outputs, inputs.velocities)
+            aid(state, plan, inputs, outputs, inputs.velocities, rolling, joined)
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
-        propagate(blocks, groups, members, near, clock, shared, (end - now) / interval, end - now, work)
+        fraction = (end - now) / interval
+        propagate(blocks, groups, members, near, clock, shared, fraction, end - now, work, rolling, joined)
         while next_fix <= end + snap:
-            aid(state, plan, inputs, outputs, inputs.velocities)
+            aid(state, plan, inputs, outputs, inputs.velocities, rolling, joined)
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
+        if rolling is not None:
+            measurements = state.measurements
+            if rolling.present.shape[0] > 0:
+                wheels.carry(k, end, blocks, groups, members, near, rolling, joined, interval)
+            wheels.step(k, end, blocks, groups, members, measurements, near, rolling, joined, interval)
         write(groups, members, states, variances, k)
         if (k - 1) % plan.log_every == 0:
             _log(state, outputs, end)
-            _gather_idle_lanes(blocks, members[-1, 1])
+            _gather_idle_lanes(blocks, members)

@@ -25,6 +25,8 @@ class Aligned:
     increments: Array
     """dtheta (rad) and dvel (m/s) over the interval that ends at `time`, shape (T, 6, N)"""
     warnings: tuple[str, ...]
+    missing: NDArray[np.bool_]
+    """where an IMU has a gap, shape (T, N); what stands there is bridged, or zero"""
 
     @property
     def rate_hz(self) -> float:
@@ -34,15 +36,17 @@ class Aligned:
     def between(self, begin: float, end: float) -> Aligned:
         """Return the epochs with begin <= time <= end."""
         first, last = np.searchsorted(self.time, [begin, np.nextafter(end, np.inf)])
-        return Aligned(self.time[first:last], self.increments[first:last], self.warnings)
+        part = slice(first, last)
+        return Aligned(self.time[part], self.increments[part], self.warnings, self.missing[part])
 
 
-def align(streams: tuple[ImuStream, ...]) -> Aligned:
+def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
     """Bring the streams onto the time stamps of the first one without gaps, within their common span.
 
     The increments of the others are interpolated as running sums, so that no rotation or velocity is lost or counted
     twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one, the mean
-    of the rates on both sides. Either is a warning. Raises InputError if less than two seconds are common.
+    of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Raises InputError if less
+    than two seconds are common.
     """
     time = _common_time(streams)
     increments = np.empty((len(time), 6, len(streams)))
@@ -62,9 +66,11 @@ def align(streams: tuple[ImuStream, ...]) -> Aligned:
             begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
             count = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
             warnings.append(f"IMU {stream.name}: {count} of {end - begin:.3f} s at {begin:.3f} s")
-    if missing.any():
+    if bridge and missing.any():
         _bridge(time, increments, missing)
-    return Aligned(time, increments, tuple(warnings))
+    else:
+        increments[np.broadcast_to(missing[:, None, :], increments.shape)] = 0.0
+    return Aligned(time, increments, tuple(warnings), missing)
 
 
 def _common_time(streams: tuple[ImuStream, ...]) -> Array:

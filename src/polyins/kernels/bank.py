@@ -20,6 +20,7 @@ QUATERNION = _take(4)  # q_nb, scalar first
 MATRIX = _take(9)  # C_nb, kept in step with the quaternion
 # estimated errors: gyro bias, accelerometer bias, gyro scale, accelerometer scale
 ERRORS = _take(12)
+MOUNTING = _take(3)  # of a vehicle with wheels, see `share`; it follows the errors of the IMU
 SENSITIVITY = _take(6)  # 1 / (1 + scale) of gyros and accelerometers, kept in step with the errors
 # measured increments over the whole interval, and the corrected ones over the part that is propagated
 RAW_DTHETA = _take(3)
@@ -31,6 +32,17 @@ PREVIOUS_DVEL = _take(3)
 # geometry in array axes, m
 TO_ORIGIN = _take(3)  # from the IMU to the array origin
 TO_ANTENNA = _take(3)  # from the IMU to the GNSS antenna
+# of a vehicle with wheels, m
+WHEEL = _take(1)  # radius, 0 on the body
+TO_WHEEL = _take(3)  # from the IMU to the centre of its wheel, in its axes
+TO_SPEED = _take(3)  # from the IMU to the middle of the vehicle's rear axle, in its axes
+IN_VEHICLE = _take(3)  # the wheel's centre, or the IMU on the body, in vehicle axes
+# while a mean speed is taken: what the point of that speed travelled in vehicle axes, and the last epoch's state
+TRAVELLED = _take(3)
+TURNED = _take(3)  # sum of the corrected increments, rad
+BEFORE_POINT = _take(3)
+BEFORE_VELOCITY = _take(3)
+BEFORE_VEHICLE = _take(9)
 WEIGHT = _take(1)  # share in means; the weights of a bank add up to one
 # intermediates of one mechanization: where the earth is evaluated and what it gives
 AT_POSITION = _take(3)
@@ -46,6 +58,6 @@ DVEL_N = _take(3)  # velocity increment of the specific force in n
 # the solution seen at the array origin
 ORIGIN_POSITION = _take(3)
 ORIGIN_VELOCITY = _take(3)
-CORRECTION = _take(21)  # error state of the last update
+CORRECTION = _take(24)  # error state of the last update
 
 SIZE = _layout.size

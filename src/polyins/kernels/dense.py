@@ -9,7 +9,7 @@ import numpy as np
 
 from polyins.kernels import share
 from polyins.kernels.jit import Array, kernel
-from polyins.kernels.share import HALF, NAV, STATES, STRIDE, P
+from polyins.kernels.share import HALF, INERTIAL, NAV, STRIDE, P
 
 NOISES = 18
 
@@ -18,13 +18,13 @@ PHI, COVARIANCE, NOISE, PRODUCT, RESULT = range(5)
 
 def workspace() -> tuple[Array, Array]:
     """Return the square matrices (5, 21, 21) and the noise shaping matrices G and G Qc, (2, 21, 18)."""
-    return np.zeros((5, STATES, STATES)), np.zeros((2, STATES, NOISES))
+    return np.zeros((5, INERTIAL, INERTIAL)), np.zeros((2, INERTIAL, NOISES))
 
 
 @kernel
 def _fill_phi(g: Array, dt: float, phi: Array) -> None:
     phi[:] = 0.0
-    for k in range(STATES):
+    for k in range(INERTIAL):
         for i in range(NAV):
             phi[i, k] = g[share.F + k * HALF + i]
         phi[k, k] += 1.0
@@ -54,17 +54,17 @@ def predict(g: Array, dt: float, squares: Array, shaping: Array) -> None:
     share.mirror(g)
     _fill_phi(g, dt, phi)
     _fill_noise(g, dt, shaping)
-    for i in range(STATES):
-        for j in range(STATES):
+    for i in range(INERTIAL):
+        for j in range(INERTIAL):
             p[i, j] = g[P + i * STRIDE + j]
     np.dot(shaping[1], shaping[0].T, q)
     np.dot(phi, q, product)
     np.dot(product, phi.T, result)
-    for i in range(STATES):
-        for j in range(STATES):
+    for i in range(INERTIAL):
+        for j in range(INERTIAL):
             q[i, j] = 0.5 * (result[i, j] + q[i, j])
     np.dot(phi, p, product)
     np.dot(product, phi.T, result)
-    for i in range(STATES):
-        for j in range(STATES):
+    for i in range(INERTIAL):
+        for j in range(INERTIAL):
             g[P + i * STRIDE + j] = result[i, j] + q[i, j]

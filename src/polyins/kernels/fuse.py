@@ -107,6 +107,16 @@ def fuse_states(blocks: Array, first: int, last: int, g: Array) -> None:
 
 
 @kernel
+def fuse_shares(blocks: Array, groups: Array, members: Array, dt: float) -> None:
+    """Fuse the members of each share."""
+    if members[members.shape[0] - 1, 1] > members.shape[0]:  # some share has several
+        for b in range(blocks.shape[0]):
+            project_to_origin(blocks[b], dt)
+    for s in range(members.shape[0]):
+        fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
+
+
+@kernel
 def quaternion_to_matrix(g: Array, q: int, c: int) -> None:
     """Write the rotation matrix at offset `c` of the quaternion at offset `q`."""
     q0, q1, q2, q3 = g[q], g[q + 1], g[q + 2], g[q + 3]
@@ -184,7 +194,7 @@ def correct_members(blocks: Array, first: int, last: int, metres: Array) -> None
         for k in range(3):
             w[bank.POSITION + k * LANES + lane] -= w[bank.CORRECTION + k * LANES + lane] / metres[k]
             w[bank.VELOCITY + k * LANES + lane] -= w[bank.CORRECTION + (3 + k) * LANES + lane]
-        for k in range(12):
+        for k in range(15):
             w[bank.ERRORS + k * LANES + lane] += w[bank.CORRECTION + (9 + k) * LANES + lane]
         _rotate(w, lane)
 

@@ -13,6 +13,8 @@ _take = _layout.take
 
 
 H = _take(ROWS * STRIDE)
+LENT = _take(ROWS * STRIDE)  # the design matrix in the states of the IMU that lends roll and pitch
+TURN = _take(ROWS * 3)  # what a small rotation of the vehicle, in n, does to the measurement
 R = _take(ROWS)  # variances of the measurement
 HP = _take(ROWS * STRIDE)
 S = _take(ROWS * ROWS)  # innovation covariance
@@ -73,6 +75,21 @@ def normalized_innovation_squared(m: Array) -> float:
         for b in range(ROWS):
             total += m[RESIDUAL + a] * m[S_INVERSE + ROWS * a + b] * m[RESIDUAL + b]
     return total
+
+
+@kernel
+def cautious_innovation_squared(m: Array, caution: float) -> float:
+    """Return z' S^-1 z as if the prediction's std were `caution` times as large: S = caution^2 H P H' + R.
+
+    Writes over S and its inverse, not over the gain.
+    """
+    factor = caution * caution
+    for a in range(ROWS):
+        for b in range(ROWS):
+            m[S + ROWS * a + b] *= factor
+        m[S + ROWS * a + a] -= (factor - 1.0) * m[R + a]
+    _invert(m)
+    return normalized_innovation_squared(m)
 
 
 @kernel

@@ -1,8 +1,11 @@
 """One covariance block and what drives it: the IMUs that share it, their fused state, the error model.
 
 The 21 error states are position (m), velocity (m/s), phi (rad), in n; gyro bias, accelerometer bias, gyro scale,
-accelerometer scale. Navigation errors are estimate minus truth, r_hat = r + dr, v_hat = v + dv, C_hat = (I - phi x) C;
-IMU errors are truth minus estimate. So estimates are corrected by r -= dr, v -= dv, C = (I + phi x) C, errors += dx.
+accelerometer scale. Three more are of the mounting of an IMU on a vehicle with wheels and zero elsewhere: the relative
+error of the wheel speed, then for a wheel its lever arm (y, z, m), for the body pitch and yaw of the mount (rad).
+
+Navigation errors are estimate minus truth, r_hat = r + dr, v_hat = v + dv, C_hat = (I - phi x) C;
+the others are truth minus estimate. So estimates are corrected by r -= dr, v -= dv, C = (I + phi x) C, errors += dx.
 """
 
 from __future__ import annotations
@@ -13,7 +16,8 @@ from polyins.kernels import earth
 from polyins.kernels.jit import Array, kernel
 from polyins.kernels.layout import Layout
 
-STATES = 21
+STATES = 24
+INERTIAL = 21
 NAV = 9  # position, velocity, phi
 # Loops over columns have constant bounds and whole vectors of eight. What they compute beyond the columns that count is
 # finite and never used, or overwritten.
@@ -33,6 +37,7 @@ QUATERNION = _take(4)
 MATRIX = _take(9)
 RATE = _take(3)  # rad/s
 FORCE = _take(3)  # m/s^2
+VEHICLE = _take(9)  # C_nv of a vehicle with wheels
 WEIGHTS = _take(1)  # sum of the members' weights
 LANE_SUMS = _take(4 * 8)  # work of the means
 METRIC = _take(3)  # metres per unit of each coordinate at the last fix
@@ -44,7 +49,7 @@ ERROR_PSD = _take(12)  # 2 sigma^2 / tau of each Gauss-Markov process
 DECAY = _take(12)  # 1 / tau
 FACTOR = _take(STRIDE)  # 1 - dt / tau by column
 # error model times dt: row k holds what state k does to position, velocity and phi, that is F' without its zero rows
-F = _take(STATES * HALF)
+F = _take(INERTIAL * HALF)
 HALF_Q_V = _take(9)
 HALF_Q_P = _take(9)
 # products
@@ -359,4 +364,7 @@ def mirror(g: Array) -> None:
     """Write the lower left block of P, which predictions leave behind, from the upper right one."""
     for i in range(NAV):
         for k in range(NAV, STATES):
+            g[P + k * STRIDE + i] = g[P + i * STRIDE + k]
+    for i in range(NAV, INERTIAL):
+        for k in range(INERTIAL, STATES):
             g[P + k * STRIDE + i] = g[P + i * STRIDE + k]

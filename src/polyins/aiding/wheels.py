@@ -1,0 +1,543 @@
+"""How wheels aid the bank: when which measurement is due, for which share, with which speed.
+
+The answer of all shares together stands in the last group, see `vehicle.merge`. Shares that are silent, because their
+IMU gives no data, neither measure nor are corrected; they are carried along with the vehicle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from polyins.aiding import reference_point, standstill, vehicle_attitude, wheel_speed
+from polyins.kernels import bank, earth, fuse, joint, kalman, share, strapdown, vehicle
+from polyins.kernels.bank import LANES
+from polyins.kernels.jit import Array, kernel
+from polyins.kernels.share import STATES, STRIDE
+
+SPEED, POINT, ZERO_VELOCITY, ZERO_RATE = 0, 1, 2, 3
+"""Kinds of measurement."""
+
+# places in `Rolling.settings`
+SPEED_INTERVAL, SPEED_WINDOW, POINT_INTERVAL, AT_END, STANDSTILL = range(5)
+POINT_VARIANCE, ZERO_VELOCITY_VARIANCE, ZERO_RATE_VARIANCE, STILL_RATE = range(5, 9)
+SETTINGS = 9
+
+# places in `Rolling.memory`
+LAST_SPEED, LAST_POINT, OPENED, WATCHED, TRAVEL, LATERAL, STILL = range(7)
+MEMORY = 7
+
+# places in `Rolling.given`
+G_SPEED, G_LATERAL, G_DURATION, G_DT = range(4)
+G_KNOWN, G_POINT, G_VARIANCE = 4, 7, 10
+GIVEN = 13
+
+RESEED_POSITION, RESEED_VELOCITY, RESEED_TILT, RESEED_HEADING = 0.1, 0.2, 0.1, 0.02
+"""Standard deviations of a share that speaks again: m, m/s, rad, rad; the wheel's angle is found from its bearing."""
+
+
+class Rolling(NamedTuple):
+    """What a run with wheels is told, and what it remembers of them."""
+
+    lenders: Array
+    """int64 (shares,): the share that lends roll and pitch; -1: none, or on the body"""
+    noise: Array
+    """(shares, 3): variances of the velocity, (m/s)^2 forward, right, down"""
+    settings: Array
+    antenna: Array
+    """m, in vehicle axes"""
+    travel: Array
+    """(T, 2): m that the wheels rolled in the interval that ends at each epoch, NaN where none speaks; m to the right
+    of the axle's middle, the mean place of the wheels that speak"""
+    present: Array
+    """uint8 (T, shares): whether the IMUs of a share give data; (0, shares): they always do"""
+    drift: Array
+    """(shares, 3): growth of the variances of the mounting states per second"""
+    memory: Array
+    silent: Array
+    """(shares,): since when, s; below zero: not silent"""
+    given: Array
+    """what the measurement that is being applied needs"""
+
+
+class Joint(NamedTuple):
+    """The covariance of all shares together and its work arrays, see `kernels.joint`."""
+
+    whole: Array
+    h: Array
+    hp: Array
+    gain: Array
+    ah: Array
+    work: Array
+
+
+@kernel
+def settle(blocks: Array, groups: Array, members: Array, rolling: Rolling, dt: float) -> None:
+    """Bring everything that follows from the navigation states up to date."""
+    for b in range(blocks.shape[0]):
+        strapdown.update_matrix(blocks[b])
+        strapdown.update_sensitivity(blocks[b])
+    fuse.fuse_shares(blocks, groups, members, dt)
+    vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
+
+
+@kernel
+def _residual(kind: int, w: Array, lane: int, lent: vehicle.Matrix, rolling: Rolling, near: Array) -> vehicle.Three:
+    given = rolling.given
+    if kind == SPEED:
+        if rolling.settings[AT_END] != 0.0:
+            return wheel_speed.residual_at_end(w, lane, lent, given[G_LATERAL], given[G_SPEED], given[G_DT])
+        return wheel_speed.residual_of_window(w, lane, given[G_SPEED], given[G_DURATION])
+    if kind == POINT:
+        known, point = given[G_KNOWN : G_KNOWN + 3], given[G_POINT : G_POINT + 3]
+        metres = given[GIVEN : GIVEN + 3]
+        return reference_point.residual(w, lane, lent, point, known, metres, near[0] != 0.0)
+    if kind == ZERO_VELOCITY:
+        return standstill.velocity_residual(w, lane)
+    return standstill.rate_residual(w, lane, given[G_DURATION])
+
+
+@kernel
+def _design(kind: int, g: Array, w: Array, lane: int, rolling: Rolling, m: Array) -> None:
+    given = rolling.given
+    if kind == SPEED:
+        wheel_speed.design(g, w, lane, given[G_LATERAL], given[G_SPEED], m)
+    elif kind == POINT:
+        reference_point.design(g, w, lane, given[G_POINT : G_POINT + 3], m)
+    elif kind == ZERO_VELOCITY:
+        standstill.velocity_design(m)
+    else:
+        standstill.rate_design(g, m)
+
+
+@kernel
+def measure(
+    kind: int, s: int, blocks: Array, groups: Array, members: Array, near: Array, rolling: Rolling, m: Array
+) -> None:
+    """Write design matrix, variances and residuals of a share: each member's own, and their mean."""
+    g = groups[s]
+    first, last = members[s, 0], members[s, 1]
+    w, lane = blocks[first // LANES], first % LANES
+    metres = rolling.given[GIVEN : GIVEN + 3]
+    earth.metric(g[share.POSITION : share.POSITION + 3], near[0] != 0.0, metres)
+    _design(kind, g, w, lane, rolling, m)
+    if kind in (SPEED, POINT):
+        vehicle_attitude.add_own(g, w, lane, m)
+    lent = vehicle.lent_matrix(groups, rolling.lenders[s])
+    for a in range(3):
+        m[kalman.R + a] = rolling.noise[s, a] if kind == SPEED else rolling.given[G_VARIANCE + a]
+        m[kalman.RESIDUAL + a] = 0.0
+    for i in range(first, last):
+        z = _residual(kind, blocks[i // LANES], i % LANES, lent, rolling, near)
+        for a in range(3):
+            blocks[i // LANES, bank.CORRECTION + a * LANES + i % LANES] = z[a]
+            m[kalman.RESIDUAL + a] += z[a] / (last - first)
+
+
+@kernel
+def _feed_back(s: int, blocks: Array, groups: Array, members: Array, near: Array) -> None:
+    g = groups[s]
+    metres = g[share.METRIC : share.METRIC + 3]
+    earth.metric(g[share.POSITION : share.POSITION + 3], near[0] != 0.0, metres)
+    fuse.correct_members(blocks, members[s, 0], members[s, 1], metres)
+
+
+@kernel
+def correct_each(
+    blocks: Array, groups: Array, members: Array, measurements: Array, near: Array, rolling: Rolling, dt: float
+) -> None:
+    """Apply what was measured and whose gain is known to every share that is not silent."""
+    for s in range(members.shape[0]):
+        if rolling.silent[s] < 0.0:
+            m = measurements[s]
+            kalman.update_covariance(groups[s], m)
+            for i in range(members[s, 0], members[s, 1]):
+                _member_correction(blocks[i // LANES], i % LANES, m)
+            _feed_back(s, blocks, groups, members, near)
+    settle(blocks, groups, members, rolling, dt)
+
+
+@kernel
+def _member_correction(w: Array, lane: int, m: Array) -> None:
+    z0 = w[bank.CORRECTION + lane]
+    z1 = w[bank.CORRECTION + LANES + lane]
+    z2 = w[bank.CORRECTION + 2 * LANES + lane]
+    for k in range(STATES):
+        r = kalman.K + kalman.ROWS * k
+        w[bank.CORRECTION + k * LANES + lane] = m[r] * z0 + m[r + 1] * z1 + m[r + 2] * z2
+
+
+@kernel
+def _aid_each(
+    kind: int,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    dt: float,
+) -> None:
+    """One measurement of every share, paper B's distributed filter."""
+    for s in range(members.shape[0]):
+        if rolling.silent[s] < 0.0:
+            measure(kind, s, blocks, groups, members, near, rolling, measurements[s])
+            kalman.gain(groups[s], measurements[s])
+    correct_each(blocks, groups, members, measurements, near, rolling, dt)
+
+
+@kernel
+def add_rows(s: int, sign: float, groups: Array, rolling: Rolling, m: Array, h: Array) -> None:
+    """Add the design matrix of a share, and of the one that lends to it, to that of all states."""
+    for a in range(3):
+        for k in range(STATES):
+            h[a, s * STATES + k] += sign * m[kalman.H + a * STRIDE + k]
+    lender = rolling.lenders[s]
+    if lender >= 0:
+        vehicle_attitude.write_lent(groups, s, lender, m)
+        for a in range(3):
+            for k in range(STATES):
+                h[a, lender * STATES + k] += sign * m[kalman.LENT + a * STRIDE + k]
+
+
+@kernel
+def correct_all(
+    measured: int,
+    residual: Array,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint,
+    m: Array,
+    dt: float,
+) -> None:
+    """Update the joined covariance and feed back: the members of `measured` by their own residuals, others by the mean.
+
+    The gain of all states is known.
+    """
+    joint.update(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, joined.ah)
+    k = joined.gain
+    for s in range(members.shape[0]):
+        if rolling.silent[s] >= 0.0:
+            continue
+        for i in range(members[s, 0], members[s, 1]):
+            w, lane = blocks[i // LANES], i % LANES
+            z0, z1, z2 = residual[0], residual[1], residual[2]
+            if s == measured:
+                z0 = w[bank.CORRECTION + lane]
+                z1 = w[bank.CORRECTION + LANES + lane]
+                z2 = w[bank.CORRECTION + 2 * LANES + lane]
+            for n in range(STATES):
+                j = s * STATES + n
+                w[bank.CORRECTION + n * LANES + lane] = k[0, j] * z0 + k[1, j] * z1 + k[2, j] * z2
+        _feed_back(s, blocks, groups, members, near)
+    settle(blocks, groups, members, rolling, dt)
+
+
+@kernel
+def _aid_all(
+    kind: int,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint,
+    dt: float,
+) -> None:
+    """One measurement of every share one after the other, or of the differences of their points, all states at once."""
+    joint.gather(groups, members.shape[0], joined.whole)
+    before = -1
+    for s in range(members.shape[0]):
+        if rolling.silent[s] >= 0.0 or (rolling.lenders[s] >= 0 and rolling.silent[rolling.lenders[s]] >= 0.0):
+            continue
+        if kind != POINT or before >= 0:
+            m = measurements[s]
+            joined.h[:] = 0.0
+            measure(kind, s, blocks, groups, members, near, rolling, m)
+            add_rows(s, 1.0, groups, rolling, m, joined.h)
+            if kind == POINT:
+                other = measurements[before]
+                measure(kind, before, blocks, groups, members, near, rolling, other)
+                add_rows(before, -1.0, groups, rolling, other, joined.h)
+                for a in range(3):
+                    m[kalman.RESIDUAL + a] -= other[kalman.RESIDUAL + a]
+            joint.gain(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, m)
+            measured = s if kind != POINT else -1
+            z = m[kalman.RESIDUAL : kalman.RESIDUAL + 3]
+            correct_all(measured, z, blocks, groups, members, near, rolling, joined, m, dt)
+        before = s
+    joint.scatter(groups, members.shape[0], joined.whole)
+
+
+@kernel
+def _aid(
+    kind: int,
+    variance: float,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint | None,
+    dt: float,
+) -> None:
+    for a in range(3):
+        rolling.given[G_VARIANCE + a] = variance
+        rolling.given[G_KNOWN + a] = groups[-1, share.POSITION + a]
+        rolling.given[G_POINT + a] = 0.0
+    if joined is None:
+        _aid_each(kind, blocks, groups, members, measurements, near, rolling, dt)
+    else:
+        _aid_all(kind, blocks, groups, members, measurements, near, rolling, joined, dt)
+
+
+@kernel
+def _stands(blocks: Array, members: Array, rolling: Rolling, duration: float) -> bool:
+    """Whether no IMU that speaks has turned during the window."""
+    limit = rolling.settings[STILL_RATE] * duration
+    for s in range(members.shape[0]):
+        if rolling.silent[s] < 0.0:
+            w, t = blocks[members[s, 0] // LANES], bank.TURNED + members[s, 0] % LANES
+            if w[t] ** 2 + w[t + LANES] ** 2 + w[t + 2 * LANES] ** 2 > limit * limit:
+                return False
+    return True
+
+
+@kernel
+def _end_window(
+    now: float,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint | None,
+    dt: float,
+) -> None:
+    """Update by what was watched: a speed, or a standstill."""
+    memory, given, settings = rolling.memory, rolling.given, rolling.settings
+    duration = now - memory[OPENED]
+    given[G_DURATION], given[G_DT] = duration, dt
+    given[G_SPEED] = memory[TRAVEL] / duration
+    given[G_LATERAL] = memory[LATERAL]
+    since = now - memory[LAST_SPEED]
+    for s in range(members.shape[0]):
+        for k in range(3):
+            groups[s, share.P + (share.INERTIAL + k) * (STRIDE + 1)] += since * rolling.drift[s, k]
+    memory[LAST_SPEED] = now
+    still = settings[STANDSTILL] != 0.0 and _stands(blocks, members, rolling, duration)
+    memory[STILL] += since if still else 0.0
+    if still:
+        variance = settings[ZERO_VELOCITY_VARIANCE]
+        _aid(ZERO_VELOCITY, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
+        variance = settings[ZERO_RATE_VARIANCE]
+        _aid(ZERO_RATE, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
+    elif math.isfinite(given[G_SPEED]):
+        _aid(SPEED, 0.0, blocks, groups, members, measurements, near, rolling, joined, dt)
+
+
+@kernel
+def step(
+    k: int,
+    now: float,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint | None,
+    dt: float,
+) -> None:
+    """Do what is due at epoch k, at time `now`, whose interval took `dt` seconds."""
+    memory, settings = rolling.memory, rolling.settings
+    half = 0.5 * dt
+    if memory[WATCHED] >= 0.0:
+        memory[WATCHED] += 1.0
+        memory[TRAVEL] += rolling.travel[k, 0]
+        for s in range(members.shape[0]):
+            lent = vehicle.lent_matrix(groups, rolling.lenders[s])
+            for i in range(members[s, 0], members[s, 1]):
+                wheel_speed.watch(blocks[i // LANES], i % LANES, lent, memory[LATERAL], dt)
+        if now - memory[LAST_SPEED] >= settings[SPEED_INTERVAL] - half:
+            _end_window(now, blocks, groups, members, measurements, near, rolling, joined, dt)
+            memory[WATCHED] = -1.0
+    if memory[WATCHED] < 0.0 and now - memory[LAST_SPEED] >= settings[SPEED_INTERVAL] - settings[SPEED_WINDOW] - half:
+        memory[WATCHED] = memory[TRAVEL] = 0.0
+        memory[OPENED], memory[LATERAL] = now, rolling.travel[k, 1]
+        for s in range(members.shape[0]):
+            lent = vehicle.lent_matrix(groups, rolling.lenders[s])
+            for i in range(members[s, 0], members[s, 1]):
+                wheel_speed.open_window(blocks[i // LANES], i % LANES, lent, memory[LATERAL])
+    if members.shape[0] > 1 and now - memory[LAST_POINT] >= settings[POINT_INTERVAL] - half:
+        memory[LAST_POINT] = now
+        variance = settings[POINT_VARIANCE]
+        _aid(POINT, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
+
+
+@kernel
+def carry(
+    k: int,
+    now: float,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint | None,
+    dt: float,
+) -> None:
+    """Carry silent shares along with the vehicle, and let those speak again whose data are back."""
+    _coast(groups, rolling.silent, near, dt)
+    for s in range(members.shape[0]):
+        if rolling.present[k, s] == 0:
+            if rolling.silent[s] < 0.0:
+                rolling.silent[s] = now - dt
+                rolling.memory[WATCHED] = -1.0
+            _place(s, blocks, groups, members, near, rolling.travel[k, 0], dt)
+        elif rolling.silent[s] >= 0.0:
+            _reseed(s, groups, joined)
+            rolling.silent[s] = -1.0
+            rolling.memory[WATCHED] = -1.0
+
+
+@kernel
+def _place(s: int, blocks: Array, groups: Array, members: Array, near: Array, travel: float, dt: float) -> None:
+    """Put the members of a share where the vehicle has them, and turn a wheel about its axle as far as it rolled."""
+    merged = groups[-1]
+    v = vehicle.matrix_at(merged, share.VEHICLE)
+    forward = v[0] * merged[share.VELOCITY] + v[3] * merged[share.VELOCITY + 1] + v[6] * merged[share.VELOCITY + 2]
+    rolled = travel if math.isfinite(travel) else forward * dt
+    for i in range(members[s, 0], members[s, 1]):
+        w, lane = blocks[i // LANES], i % LANES
+        c = v if w[bank.WHEEL + lane] == 0.0 else vehicle.wheel_turned(w, lane, v, -rolled / w[bank.WHEEL + lane])
+        vehicle.put_attitude(w, lane, c)
+        ln, le, ld = vehicle.rotated(c, *vehicle.lever_to_wheel(w, lane))
+        p = bank.IN_VEHICLE + lane
+        pn, pe, pd = vehicle.rotated(v, w[p], w[p + LANES], w[p + 2 * LANES])
+        place = (
+            merged[share.POSITION] + (pn - ln) * w[bank.TO_LATITUDE + lane],
+            merged[share.POSITION + 1] + (pe - le) * w[bank.TO_LONGITUDE + lane],
+            merged[share.POSITION + 2] - (pd - ld),
+        )
+        for k in range(3):
+            w[bank.POSITION + k * LANES + lane] = place[k]
+            w[bank.VELOCITY + k * LANES + lane] = merged[share.VELOCITY + k]
+    fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
+
+
+@kernel
+def _coast(groups: Array, silent: Array, near: Array, dt: float) -> None:
+    """With every share silent the vehicle goes on as it went."""
+    for s in range(silent.shape[0]):
+        if silent[s] < 0.0:
+            return
+    merged = groups[-1]
+    metres = merged[share.METRIC : share.METRIC + 3]
+    earth.metric(merged[share.POSITION : share.POSITION + 3], near[0] != 0.0, metres)
+    for k in range(3):
+        merged[share.POSITION + k] += merged[share.VELOCITY + k] * dt / metres[k]
+
+
+@kernel
+def _reseed(s: int, groups: Array, joined: Joint | None) -> None:
+    """Begin anew with what the vehicle says of a share; what is known of its IMU's errors stays."""
+    g = groups[s]
+    share.mirror(g)
+    for i in range(share.NAV):
+        for j in range(STATES):
+            g[share.P + i * STRIDE + j] = 0.0
+            g[share.P + j * STRIDE + i] = 0.0
+    for k in range(3):
+        g[share.P + k * (STRIDE + 1)] = RESEED_POSITION**2
+        g[share.P + (3 + k) * (STRIDE + 1)] = RESEED_VELOCITY**2
+        g[share.P + (6 + k) * (STRIDE + 1)] = RESEED_HEADING**2 if k == 2 else RESEED_TILT**2
+    if joined is not None:
+        for i in range(share.NAV):
+            for j in range(joined.whole.shape[0]):
+                joined.whole[s * STATES + i, j] = 0.0
+                joined.whole[j, s * STATES + i] = 0.0
+
+
+@kernel
+def measure_position_each(
+    fix: Array, blocks: Array, groups: Array, members: Array, measurements: Array, near: Array, rolling: Rolling
+) -> float:
+    """Measure a GNSS position with every share that is not silent; return the mean of their NIS."""
+    _know(fix, rolling)
+    total, speaking = 0.0, 0
+    for s in range(members.shape[0]):
+        if rolling.silent[s] < 0.0:
+            measure(POINT, s, blocks, groups, members, near, rolling, measurements[s])
+            kalman.gain(groups[s], measurements[s])
+            total += kalman.normalized_innovation_squared(measurements[s])
+            speaking += 1
+    return total / max(speaking, 1)
+
+
+@kernel
+def measure_position_all(
+    fix: Array,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint,
+) -> float:
+    """Measure a GNSS position with the mean of what all shares predict, since its noise is one; return the NIS."""
+    _know(fix, rolling)
+    joint.gather(groups, members.shape[0], joined.whole)
+    joined.h[:] = 0.0
+    speaking = 0
+    for s in range(members.shape[0]):
+        if rolling.silent[s] < 0.0:
+            speaking += 1
+    m = measurements[0]
+    z0, z1, z2 = 0.0, 0.0, 0.0
+    for s in range(members.shape[0]):
+        if rolling.silent[s] < 0.0:
+            measure(POINT, s, blocks, groups, members, near, rolling, m)
+            add_rows(s, 1.0 / speaking, groups, rolling, m, joined.h)
+            z0 += m[kalman.RESIDUAL] / speaking
+            z1 += m[kalman.RESIDUAL + 1] / speaking
+            z2 += m[kalman.RESIDUAL + 2] / speaking
+    m[kalman.RESIDUAL], m[kalman.RESIDUAL + 1], m[kalman.RESIDUAL + 2] = z0, z1, z2
+    joint.gain(joined.h, fix[3:6], joined.whole, joined.hp, joined.gain, m)
+    return kalman.normalized_innovation_squared(m)
+
+
+@kernel
+def _know(fix: Array, rolling: Rolling) -> None:
+    for a in range(3):
+        rolling.given[G_KNOWN + a] = fix[a]
+        rolling.given[G_VARIANCE + a] = fix[3 + a]
+        rolling.given[G_POINT + a] = rolling.antenna[a]
+
+
+@kernel
+def correct_by_position(
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint | None,
+    dt: float,
+) -> None:
+    """Apply the GNSS position that was measured."""
+    if joined is None:
+        correct_each(blocks, groups, members, measurements, near, rolling, dt)
+    else:
+        m = measurements[0]
+        z = m[kalman.RESIDUAL : kalman.RESIDUAL + 3]
+        correct_all(-1, z, blocks, groups, members, near, rolling, joined, m, dt)
+        joint.scatter(groups, members.shape[0], joined.whole)

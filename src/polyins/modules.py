@@ -1,0 +1,246 @@
+"""Which modules of a rig with wheels a method takes, and what the engine is told of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins import alignment
+from polyins.aiding import wheels
+from polyins.aiding.wheels import Joint, Rolling
+from polyins.alignment import Start
+from polyins.errors import InputError
+from polyins.geodesy import metres_per_unit
+from polyins.kernels import bank, joint, share
+from polyins.kernels.bank import LANES
+from polyins.methods import Method
+from polyins.recording import Recording, RollingOptions
+from polyins.rig import DEG, Imu, Rig
+from polyins.timesync import Aligned
+
+Array = NDArray[np.float64]
+
+ZERO_VELOCITY_STD = 0.01  # m/s
+ZERO_RATE_STD = 0.05 * DEG  # rad/s, of the mean over a window; an idling engine shakes more than gyros are noisy
+STILL_RATE = 0.6 * DEG  # rad/s, above what is left of biases and vibration, below a wheel that creeps
+
+
+@dataclass(frozen=True)
+class Modules:
+    """Indices of IMUs, by module."""
+
+    navigate: tuple[tuple[int, ...], ...]
+    """a share each: wheels first"""
+    speed: tuple[tuple[int, ...], ...]
+    """the modules on wheels that give the speed"""
+
+    @property
+    def all(self) -> list[int]:
+        """Indices of all IMUs that are needed, those that navigate first."""
+        own = [i for module in self.navigate for i in module]
+        return own + [i for module in self.speed for i in module if i not in own]
+
+
+def choose(row: Method, rig: Rig) -> Modules:
+    """Choose the modules of a method: those that it names, then in the order of the rig.
+
+    Raises InputError where the rig lacks what the method needs.
+    """
+    if not rig.rolling:
+        raise InputError(f"method: {row.name} needs an IMU on a wheel; expected `wheel` in one of the imus")
+    modules = rig.modules()
+    members = {name: tuple(indices) for name, indices in modules.items()}
+    for name in row.chosen:
+        if name not in modules and name not in [imu.name for imu in rig.imus]:
+            raise InputError(f"method: {row.name}: {name!r} is no IMU or module; expected one of {', '.join(modules)}")
+        for module, indices in modules.items():
+            if name != module and name in [rig.imus[i].name for i in indices]:
+                members[module] = tuple(i for i in indices if rig.imus[i].name in row.chosen)
+    wheels_, bodies = [], []
+    for name in sorted(modules, key=lambda name: _rank(name, members[name], row, rig)):
+        first = rig.imus[modules[name][0]]
+        if first.wheel is None:
+            bodies.append(members[name])
+        elif not first.wheel.steering or _is_named(name, members[name], row, rig):
+            wheels_.append(members[name])
+    speed = tuple(wheels_[: row.wheels])
+    body = tuple(bodies[: row.bodies])
+    _check_enough(row, len(wheels_), len(bodies))
+    return Modules((*speed, *body) if row.wheels_navigate else body, speed)
+
+
+def _is_named(name: str, indices: tuple[int, ...], row: Method, rig: Rig) -> bool:
+    return name in row.chosen or any(rig.imus[i].name in row.chosen for i in indices)
+
+
+def _rank(name: str, indices: tuple[int, ...], row: Method, rig: Rig) -> int:
+    return 0 if _is_named(name, indices, row, rig) else 1
+
+
+def _check_enough(row: Method, wheels_: int, bodies: int) -> None:
+    many = row.wheels > 2
+    wanted_wheels, wanted_bodies = (1, 0) if many else (row.wheels, row.bodies)
+    if many and wheels_ + bodies < 2:
+        raise InputError(f"method: {row.name} needs two modules or more; this rig has {wheels_ + bodies}")
+    if wheels_ < wanted_wheels:
+        raise InputError(
+            f"method: {row.name} needs {wanted_wheels} wheels that do not steer; this rig has {wheels_} with an IMU"
+        )
+    if bodies < wanted_bodies:
+        raise InputError(f"method: {row.name} needs an IMU on the body; expected one without `wheel` among the imus")
+
+
+def available(rig: Rig) -> list[str]:
+    """Return the methods with wheels that a rig has the modules for."""
+    from polyins.methods import METHODS
+
+    names = []
+    for row in METHODS.values():
+        if row.rolling:
+            try:
+                choose(row, rig)
+            except InputError:
+                continue
+            names.append(row.name)
+    return names
+
+
+def lanes(modules: Modules) -> tuple[list[tuple[int, int]], list[int]]:
+    """Return the span of lanes of each share, and which IMU (counted among those that navigate) each lane takes.
+
+    Several chips of a module begin with a block of their own; lanes in between repeat the chip before.
+    """
+    spans: list[tuple[int, int]] = []
+    order: list[int] = []
+    number = 0
+    crowded = any(len(module) > 1 for module in modules.navigate)
+    for module in modules.navigate:
+        while crowded and len(order) % LANES:
+            order.append(number - 1)
+        spans.append((len(order), len(order) + len(module)))
+        order += range(number, number + len(module))
+        number += len(module)
+    return spans, order
+
+
+def rolling(
+    modules: Modules, spans: list[tuple[int, int]], recording: Recording, aligned: Aligned, start_bias: Array
+) -> Rolling:
+    """Lay out what the engine needs of the wheels. `recording` and `aligned` hold the IMUs of `modules.all` in order.
+
+    `start_bias`: gyro biases at the start, rad/s, shape (N, 3).
+    """
+    options = recording.options.rolling
+    position = {index: place for place, index in enumerate(modules.all)}
+    here = [tuple(position[i] for i in module) for module in modules.navigate]
+    speed = [tuple(position[i] for i in module) for module in modules.speed]
+    imus = recording.rig.imus
+    bodies = [s for s, module in enumerate(here) if imus[module[0]].wheel is None]
+    missing = aligned.missing
+    present = np.zeros((0, len(here)), dtype=np.uint8)
+    if missing.any():
+        speaks = [~missing[:, module].any(axis=1) for module in here]
+        present = np.ascontiguousarray(np.array(speaks, dtype=np.uint8).T)
+    memory = np.zeros(wheels.MEMORY)
+    memory[wheels.LAST_SPEED] = memory[wheels.LAST_POINT] = aligned.time[0]
+    memory[wheels.WATCHED] = -1.0
+    return Rolling(
+        lenders=np.array([bodies[0] if bodies and s not in bodies else -1 for s in range(len(here))], dtype=np.int64),
+        noise=np.array([options.body_speed_std if s in bodies else options.wheel_speed_std for s in range(len(here))])
+        ** 2,
+        settings=_settings(options),
+        antenna=recording.rig.antenna,
+        travel=_travel(speed, recording.rig, aligned, start_bias),
+        present=present,
+        drift=np.zeros((len(here), 3)),
+        memory=memory,
+        silent=np.full(len(here), -1.0),
+        given=np.zeros(wheels.GIVEN + 3),
+    )
+
+
+def _settings(options: RollingOptions) -> Array:
+    settings = np.zeros(wheels.SETTINGS)
+    settings[wheels.SPEED_INTERVAL] = options.speed_interval
+    settings[wheels.SPEED_WINDOW] = options.speed_window
+    settings[wheels.POINT_INTERVAL] = options.constraint_interval
+    settings[wheels.AT_END] = float(options.predict == "end")
+    settings[wheels.STANDSTILL] = float(options.standstill)
+    settings[wheels.POINT_VARIANCE] = options.constraint_std**2
+    settings[wheels.ZERO_VELOCITY_VARIANCE] = ZERO_VELOCITY_STD**2
+    settings[wheels.ZERO_RATE_VARIANCE] = ZERO_RATE_STD**2
+    settings[wheels.STILL_RATE] = STILL_RATE
+    return settings
+
+
+def _travel(speed: list[tuple[int, ...]], rig: Rig, aligned: Aligned, start_bias: Array) -> Array:
+    """Return what the wheels rolled in each interval and where the mean of those that speak is, shape (T, 2), m.
+
+    v = -r w_x, with the rate as the gyro shows it less its bias at the start; chips of a module are averaged.
+    """
+    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
+    total, places, count = np.zeros(len(intervals)), np.zeros(len(intervals)), np.zeros(len(intervals))
+    for module in speed:
+        rolled = np.zeros(len(intervals))
+        speaks = np.ones(len(intervals), dtype=bool)
+        for i in module:
+            wheel = rig.imus[i].wheel
+            assert wheel is not None
+            rolled -= wheel.radius * (aligned.increments[:, 0, i] - start_bias[i, 0] * intervals) / len(module)
+            speaks &= ~aligned.missing[:, i]
+        total += np.where(speaks, rolled, 0.0)
+        places += np.where(speaks, rig.imus[module[0]].position[1], 0.0)
+        count += speaks
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lateral = np.where(count > 0, places / count, 0.0)
+        return np.ascontiguousarray(np.column_stack([np.where(count > 0, total / count, np.nan), lateral]))
+
+
+def joined(shares: int) -> Joint:
+    """Return the joined covariance of that many shares, empty, and its work arrays."""
+    size = shares * share.STATES
+    return Joint(
+        whole=np.zeros((size, size)),
+        h=np.zeros((3, size)),
+        hp=np.zeros((3, size)),
+        gain=np.zeros((3, size)),
+        ah=np.zeros((3, size)),
+        work=np.zeros(joint.SIZE),
+    )
+
+
+def fill_lane(w: Array, lane: int, imu: Imu, start: Start, attitude: Array, errors: Array, geodetic: bool) -> None:
+    """Put an IMU where it is mounted on the vehicle, which stands or moves straight on.
+
+    `attitude`: roll, pitch, heading of the IMU, rad; `errors`: its twelve slow errors.
+    """
+    from scipy.spatial.transform import Rotation
+
+    def put(field: int, values: Array) -> None:
+        w[field + lane : field + lane + len(values) * LANES : LANES] = values
+
+    c = alignment.rotation_matrix(attitude)
+    to_wheel = np.zeros(3) if imu.wheel is None else imu.wheel.lever_arm
+    place = alignment.rotation_matrix(start.attitude) @ imu.position - c @ to_wheel
+    put(bank.POSITION, start.position + place / metres_per_unit(start.position, geodetic))
+    put(bank.VELOCITY, start.velocity)
+    put(bank.QUATERNION, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
+    put(bank.ERRORS, errors)
+    put(bank.WHEEL, np.array([0.0 if imu.wheel is None else imu.wheel.radius]))
+    put(bank.TO_WHEEL, to_wheel)
+    put(bank.IN_VEHICLE, imu.position)
+    beside = np.array([imu.position[1], 0.0, 0.0])
+    put(bank.TO_SPEED, -imu.position if imu.wheel is None else to_wheel - beside)
+    put(bank.WEIGHT, np.ones(1))
+
+
+def mounting_std(imu: Imu, speed: list[Imu]) -> Array:
+    """Return the initial std of the mounting states of an IMU, see `kernels.share`, shape (3,).
+
+    The relative error of the mean speed is that of radii which err independently.
+    """
+    radii = np.array([one.wheel.radius_std for one in speed if one.wheel])
+    own = imu.mount_std if imu.wheel is None else imu.wheel.lever_arm_std
+    return np.array([np.sqrt(np.sum(radii**2)) / len(radii), own, own])
