@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from polyins import batch
 from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
-from polyins.methods import METHODS
+from polyins.methods import ARRAY_METHODS as METHODS
 from polyins.recording import FilterOptions, ImuStream, Recording
 from polyins.rig import DEG
 

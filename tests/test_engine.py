@@ -35,7 +35,7 @@ from polyins import batch, engine
 from polyins.geodesy import metres_per_unit
 from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
-from polyins.methods import METHODS
+from polyins.methods import ARRAY_METHODS as METHODS
 from polyins.recording import FilterOptions, GnssStream, Recording
 from polyins.rig import DEG, NoiseGrade, Rig
 

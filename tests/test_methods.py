@@ -8,11 +8,11 @@ from array_recordings import shaken_recording
 
 from polyins import batch
 from polyins.errors import InputError
-from polyins.methods import METHODS, find_method
+from polyins.methods import ARRAY_METHODS, METHODS, find_method
 
 
 def test_the_table_has_the_published_array_methods() -> None:
-    assert list(METHODS) == [
+    assert list(ARRAY_METHODS) == [
         "single",
         "imu-fusion",
         "nav-fusion",

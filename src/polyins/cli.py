@@ -95,7 +95,7 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
         raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
     with progress("reading"):
         recording = load(config)
-    name = method or ("enav-fusion" if len(recording.imus) > 1 and imu is None else "single")
+    name = method or _usual_method(recording, imu)
     index = _imu_index([one.name for one in recording.rig.imus], imu)
     results.make_folder(out)
     announce_compilation()
@@ -110,6 +110,15 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     print_summaries(recording.name, {name: summary}, {})
     say("start: " + ", ".join(f"{key} {value}" for key, value in summary["start"].items()))
     say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+
+
+def _usual_method(recording: Recording, imu: str | None) -> str:
+    from polyins.modules import available
+
+    if recording.rig.rolling:
+        order = ["wheel-ins", "dual-wheel-ins", "body-wheel-ins", "triple-ins"]
+        return next(name for name in reversed(order) if name in available(recording.rig))
+    return "enav-fusion" if len(recording.imus) > 1 and imu is None else "single"
 
 
 def _imu_index(names: list[str], wanted: str | None) -> int:
@@ -135,9 +144,9 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
     from polyins import results
     from polyins.comparison import compare as run_all
     from polyins.loading import load
-    from polyins.methods import METHODS, find_method
+    from polyins.methods import find_method
 
-    names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else list(METHODS)
+    names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else None
     with progress("reading"):
         recording = load(config)
     results.make_folder(out)
@@ -149,7 +158,8 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
     if as_json:
         print(results.as_json(result.document))
         return
-    title = f"{recording.name}; single: rms over {len(recording.imus)} IMUs; sqrt(N) = {result.document['sqrt_n']:.2f}"
+    alone = "wheel-ins" if recording.rig.rolling else "single"
+    title = f"{recording.name}; {alone}: rms over {len(result.each)} IMUs; sqrt(N) = {result.document['sqrt_n']:.2f}"
     print_summaries(title, result.document["methods"], result.document["ratio_to_single"])
     say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
 
@@ -261,6 +271,16 @@ def fetch_dataset(name: str) -> None:
     from polyins import datasets as known
 
     click.echo(known.fetch(name))
+
+
+@datasets.command("config")
+@click.argument("name", metavar="NAME/TRIAL")
+@click.option("--gnss", is_flag=True, help="Let the receiver's positions aid the filter.")
+def dataset_configuration(name: str, gnss: bool) -> None:
+    """Print the configuration of a recording of a data set, such as wid/trial08."""
+    from polyins import datasets as known
+
+    click.echo(known.configuration(name, gnss=gnss), nl=False)
 
 
 @cli.command()

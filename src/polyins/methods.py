@@ -60,6 +60,9 @@ METHODS = {
     )
 }
 
+ARRAY_METHODS = tuple(name for name, row in METHODS.items() if not row.rolling)
+"""Of an array with GNSS; the others need wheels."""
+
 
 def find_method(name: str) -> Method:
     """Return the row of that name; raise InputError with the nearest known one otherwise.

@@ -50,19 +50,20 @@ def write_run(folder: Path, recording: Recording, solution: Solution, summary: D
 def write_comparison(folder: Path, recording: Recording, result: Comparison, report: bool = True) -> None:
     """Write a folder per method and what compares them.
 
-    Below `single`, which holds the first IMU's solution and the figures over all, each IMU has a folder of its name.
+    Below `single` (with wheels `wheel-ins`), which holds the first IMU's solution and the figures over all, each IMU has a folder of its name.
     """
     summaries = result.document["methods"]
+    alone = "wheel-ins" if recording.rig.rolling else "single"
     for name, solution in result.solutions.items():
-        if name != "single":
+        if name != alone:
             write_solution(solution, folder / name)
             write_document(folder / name / "summary.json", summaries[name])
-    if "single" in result.solutions:
-        write_solution(result.solutions["single"], folder / "single")
-        write_document(folder / "single" / "summary.json", summaries["single"])
-        for (name, solution), summary in zip(result.each.items(), summaries["single"]["each"], strict=True):
-            write_solution(solution, folder / "single" / name)
-            write_document(folder / "single" / name / "summary.json", summary)
+    if alone in result.solutions:
+        write_solution(result.solutions[alone], folder / alone)
+        write_document(folder / alone / "summary.json", summaries[alone])
+        for (name, solution), summary in zip(result.each.items(), summaries[alone]["each"], strict=True):
+            write_solution(solution, folder / alone / name)
+            write_document(folder / alone / name / "summary.json", summary)
     write_document(folder / "summary.json", result.document)
     _write_config(folder, recording)
     (folder / "report.html").unlink(missing_ok=True)  # of an earlier run

@@ -12,6 +12,7 @@ from polyins import __version__
 from polyins.evaluation.consistency import consistency
 from polyins.evaluation.drift import drift
 from polyins.evaluation.errors import Errors, compare_to_reference, rms
+from polyins.methods import find_method
 from polyins.evaluation.outages import Interval, outage_statistic, partly_covered
 from polyins.recording import Reference
 from polyins.solution import Innovations, Solution
@@ -56,19 +57,19 @@ def summarize(solution: Solution, reference: Reference | None, outages: Sequence
     return {key: plain(value) for key, value in document.items()}
 
 
-def comparison(summaries: Mapping[str, Document], each: Sequence[Document]) -> Document:
-    """Return the `compare` document of the summaries of the array methods and of each IMU alone.
+def comparison(summaries: Mapping[str, Document], each: Sequence[Document], alone: str = "single") -> Document:
+    """Return the `compare` document of the summaries of several methods and of each IMU alone, run by `alone`.
 
     A single IMU's figures are the root mean square (of maxima the maximum, of times the mean) over all IMUs. The ratio
     divides that figure by a method's: the outage statistic, or without outages the horizontal rms (paper A, section
     IV). The time ratio divides the method's time per epoch by a single IMU's.
     """
-    methods = {name: summary for name, summary in summaries.items() if name != "single"}
+    methods = {name: summary for name, summary in summaries.items() if name != alone}
     single = pooled(each) if each else None
     imus = len(each) or max((summary["imus"] for summary in methods.values()), default=1)
     return {
         "polyins": __version__,
-        "methods": {**({"single": single} if single else {}), **methods},
+        "methods": {**({alone: single} if single else {}), **methods},
         "ratio_to_single": {name: _ratio(figure(single), figure(summary)) for name, summary in methods.items()},
         "time_ratio_to_single": {name: _ratio(_cost(summary), _cost(single)) for name, summary in methods.items()},
         "sqrt_n": float(np.sqrt(imus)),
@@ -98,9 +99,15 @@ def pooled(each: Sequence[Document]) -> Document:
 
 
 def figure(summary: Document | None) -> float | None:
-    """Return the figure that methods are compared by, m: the outage statistic, or else the horizontal rms."""
+    """Return the figure that methods are compared by.
+
+    The outage statistic, m; without outages with wheels the drift rate, %; or else the horizontal rms, m.
+    """
     if summary is None:
         return None
+    if find_method(summary["method"]).rolling and not summary["outages"]["count"]:
+        rate: float | None = summary["drift"]["rate_percent"]
+        return rate
     of_outages: float | None = summary["outages"]["horizontal_max_rms_m"]
     of_all: float | None = summary["reference"]["horizontal_rms_m"]
     return of_outages if summary["outages"]["count"] else of_all
