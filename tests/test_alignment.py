@@ -407,6 +407,82 @@ def test_the_position_is_that_of_the_antenna_less_its_lever_arm() -> None:
     np.testing.assert_array_equal(start.position_std, 0.02)
 
 
+def lying_at(which: list[int], recording: Recording, metres_north: float = 50.0) -> Recording:
+    assert recording.gnss is not None
+    position = recording.gnss.position.copy()
+    position[which, 0] += metres_north / metres_per_unit(PLACE, True)[0]
+    return replace(recording, gnss=replace(recording.gnss, position=position))
+
+
+@pytest.mark.parametrize("given", [{"heading": 1.5}, {}], ids=["first-fix", "fix-in-motion"])
+@pytest.mark.parametrize("lie", [0, 1, 2, 3])
+def test_a_start_in_motion_is_not_where_a_lie_is(lie: int, given: dict[str, Any]) -> None:
+    steady = path(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5), duration=20.0)
+    recording = replace(drive_of(steady), start=StartOptions(**given))
+    start = found(lying_at([lie], recording))
+    truth = steady.truth(np.array([start.time]))
+    off = np.abs((start.position - truth.position[0]) * metres_per_unit(PLACE, True))
+    assert np.all(off < np.maximum(3.0 * start.position_std, 0.1))
+    assert off.max() < 1.5
+    assert np.all(np.abs(start.velocity - truth.velocity[0]) < 1.0)
+
+
+@pytest.mark.parametrize("lie", [9, 10, 11])
+def test_a_start_at_rest_is_not_where_a_lie_is(lie: int) -> None:
+    imu, seconds = standing(Rotation.identity(), 20.0), np.arange(1.0, 20.0)
+    options = StartOptions(heading=0.0, static_interval=(0.0, 11.0))
+    start = found(lying_at([lie], Recording(rig(), (imu,), gnss=fixes_at_rest(seconds), start=options)))
+    off = np.abs((start.position - PLACE) * metres_per_unit(PLACE, True))
+    assert off.max() < 0.1
+    assert (start.sources["position"] == "GNSS") == (lie != 10)  # the fix at 11 s
+
+
+def test_fixes_that_tell_the_truth_are_taken_as_they_are() -> None:
+    """Full braking, a fix each second: the median of five is far from the fix, and the fix is right."""
+    braking = path(smooth_steps(np.array([-1.0, 1.0, 7.0, 1e3]), np.array([30.0, 30.0, 2.0, 2.0])), Swing(0.0),
+                   Swing(0.0), Swing(1.5), duration=20.0)  # fmt: skip
+    recording = drive_of(braking)
+    assert recording.gnss is not None
+    every = slice(None, None, 2)
+    gnss = fixes(braking, recording.gnss.time[every])
+    for time in (0.5, 2.0, 3.5, 5.5):
+        start = found(replace(recording, gnss=gnss, start=StartOptions(time=time, heading=1.5)))
+        assert start.sources["position"] == "GNSS"
+        assert start.sources["velocity"] == "GNSS"
+        np.testing.assert_array_equal(start.position_std, 0.02)
+
+
+def test_a_start_waits_for_the_first_fix_within_the_imus() -> None:
+    """Between two fixes the position is off by what the vehicle accelerates there."""
+    speeding = path(Swing(5.0, 3.0), Swing(0.0), Swing(0.0), Swing(1.5), duration=20.0)
+    recording = drive_of(speeding)
+    imu = recording.imus[0]
+    late = ImuStream(imu.name, imu.time[120:], imu.dtheta[120:], imu.dvel[120:])
+    start = found(
+        replace(recording, imus=(late,), gnss=fixes(speeding, np.arange(0.5, 20.0)), start=StartOptions(heading=1.5))
+    )
+    assert start.sources["time"] == "first fix"
+    assert start.time == pytest.approx(1.5)
+    truth = speeding.truth(np.array([start.time]))
+    assert np.abs((start.position - truth.position[0]) * metres_per_unit(PLACE, True)).max() < 0.01
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 10.0])
+def test_positions_of_a_reference_in_coarse_steps_give_a_velocity(rate_hz: float) -> None:
+    """Steps of a decimetre at 10 Hz make half a metre per second of the difference of neighbours."""
+    steady = path(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5), duration=20.0)
+    recording = drive_of(steady)
+    time = np.arange(0.3, 20.0, 1.0 / rate_hz)
+    at = steady.truth(time)
+    metres = metres_per_unit(PLACE, True)
+    coarse = np.round((at.position - PLACE) * metres, 1) / metres + PLACE
+    for begin in (0.5, 5.05, 18.0):
+        options = StartOptions(time=begin, heading_from="reference")
+        start = found(replace(recording, reference=Reference(time, coarse, None, at.attitude), start=options))
+        truth = steady.truth(np.array([start.time]))
+        assert np.abs(start.velocity - truth.velocity[0]).max() < 0.25
+
+
 def test_a_plane_without_positions_starts_at_zero() -> None:
     imu = standing(Rotation.identity(), 15.0)
     start = found(Recording(rig(), (imu,), geodetic=False,

@@ -24,6 +24,8 @@ LONGEST_STANDSTILL = 60.0  # s
 FARTHEST_START = 10e3  # m from GNSS: farther away it is another place
 LEAST_LEFT = 1.0  # s, of data after the start
 COURSE_SPEED = 1.5  # m/s: slower than this the direction of motion is no heading
+AROUND = 5  # fixes: their median outvotes one that lies, and the two differences in which it shows
+HARDEST = 5.0  # m/s^2: what a vehicle accelerates by at most, for seconds
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,9 @@ class _Search:
         elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
             wanted, self.sources["time"] = self._moving(first), "first fix in motion"
         elif self.fixes is not None and self.options.position is None:
-            wanted, self.sources["time"] = max(first, float(self.fixes.time[0])), "first fix"
+            # between two fixes the position would be off by what the array accelerates there
+            later = self.fixes.time[self.fixes.time >= first]
+            wanted, self.sources["time"] = float(later[0]) if later.size else first, "first fix"
         else:
             wanted, self.sources["time"] = first, "first epoch"
         if not first <= wanted <= last - LEAST_LEFT:
@@ -166,13 +170,14 @@ class _Search:
             return np.zeros(3), np.full(3, 0.05)
         if self.options.heading_from == "reference" and reference is not None:
             self.sources["velocity"] = "reference"
-            velocity = reference.velocity
-            if velocity is None:
-                velocity = _differences(reference.time, reference.position, self.recording.geodetic)
-            return _interpolate(time, reference.time, velocity), np.full(3, 0.3)
+            if reference.velocity is None:
+                velocity = _velocity_of_positions(time, reference.time, reference.position, self.recording.geodetic)
+            else:
+                velocity = _interpolate(time, reference.time, reference.velocity)
+            return velocity, np.full(3, 0.3)
         if self.fixes is not None and self.fixes.velocity is not None:
             self.sources["velocity"] = "GNSS"
-            return _interpolate(time, self.fixes.time, self.fixes.velocity), np.full(3, 0.5)
+            return self._velocity_from_fixes(time)
         raise InputError("start: no velocity; expected GNSS, a standstill, or start.velocity_m_s")
 
     def _mean(self, begin: float, end: float) -> tuple[Array, Array, float]:
@@ -265,10 +270,46 @@ class _Search:
             self.sources["position"] = "zero: there is no position in the recording"
             return np.zeros(3), np.full(3, 0.01)
         self.sources["position"] = "GNSS"
-        nearest = int(np.argmin(np.abs(gnss.time - time)))
-        antenna = _interpolate_position(time, gnss.time, gnss.position, self.recording.geodetic)
+        antenna, std = self._position_from_fixes(time)
         shift = rotation_matrix(attitude) @ self.recording.rig.antenna
-        return antenna - shift / metres_per_unit(antenna, self.recording.geodetic), gnss.position_std[nearest]
+        return antenna - shift / metres_per_unit(antenna, self.recording.geodetic), std
+
+    def _velocity_from_fixes(self, time: float) -> tuple[Array, Array]:
+        """Return the interpolated velocity and its std; see `_position_from_fixes`."""
+        assert self.fixes is not None
+        assert self.fixes.velocity is not None
+        velocity, std = _interpolate(time, self.fixes.time, self.fixes.velocity), np.full(3, 0.5)
+        around = _around(time, self.fixes.time)
+        usual = np.median(self.fixes.velocity[around], axis=0)
+        allowed = 10.0 * std + 0.5 * HARDEST * np.ptp(self.fixes.time[around])
+        if len(around) < AROUND or np.all(np.abs(velocity - usual) <= allowed):
+            return velocity, std
+        self.sources["velocity"] = f"GNSS, median of {AROUND} fixes"
+        return usual, allowed / 3.0
+
+    def _position_from_fixes(self, time: float) -> tuple[Array, Array]:
+        """Return the interpolated position of the antenna and its std.
+
+        If noise and acceleration do not explain how far it is from the median of the fixes around, each brought to
+        `time` by their median velocity, a fix lies: then that median, and a std that allows for it.
+        """
+        gnss, geodetic = self.recording.gnss, self.recording.geodetic
+        assert gnss is not None
+        position = _interpolate_position(time, gnss.time, gnss.position, geodetic)
+        std = gnss.position_std[int(np.argmin(np.abs(gnss.time - time)))]
+        around = _around(time, gnss.time)
+        if len(around) < AROUND:
+            return position, std
+        assert self.fixes is not None
+        assert self.fixes.velocity is not None
+        metres = metres_per_unit(position, geodetic)
+        motion = np.median(self.fixes.velocity[around], axis=0) * (gnss.time[around] - time)[:, None]
+        off = np.median(_from(position, gnss.position[around], geodetic) * metres - motion, axis=0)
+        allowed = 10.0 * std + 0.125 * HARDEST * np.ptp(gnss.time[around]) ** 2
+        if np.all(np.abs(off) <= allowed):
+            return position, std
+        self.sources["position"] = f"GNSS, median of {AROUND} fixes"
+        return position + off / metres, allowed / 3.0
 
     def _check_place(self, time: float, position: Array) -> None:
         gnss = self.recording.gnss
@@ -432,6 +473,24 @@ def velocities_from_positions(gnss: GnssStream, geodetic: bool) -> GnssStream | 
 def _differences(time: Array, position: Array, geodetic: bool) -> Array:
     metres = _from(position[0], position, geodetic) * metres_per_unit(position[0], geodetic)
     return np.asarray(np.gradient(metres, time, axis=0))
+
+
+def _velocity_of_positions(at: float, time: Array, position: Array, geodetic: bool) -> Array:
+    """Return the velocity of a parabola through the positions within half a second, three of them at least.
+
+    The difference of neighbours would multiply their noise, or the steps in which they are written, by the rate.
+    """
+    within = np.searchsorted(time, [at - 0.5, at + 0.5])
+    first = int(np.clip(np.searchsorted(time, at) - 1, 0, max(0, len(time) - 3)))
+    near = slice(min(within[0], first), max(within[1], first + 3))
+    metres = _from(position[near][0], position[near], geodetic) * metres_per_unit(position[near][0], geodetic)
+    degree = min(2, len(metres) - 1)
+    return np.asarray(np.polyfit(time[near] - at, metres, degree)[-2] if degree else np.zeros(3))
+
+
+def _around(time: float, times: Array) -> NDArray[np.intp]:
+    """Return the indices of the fixes nearest to a time."""
+    return np.argsort(np.abs(times - time), kind="stable")[:AROUND]
 
 
 def _from(origin: Array, position: Array, geodetic: bool) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins import alignment, engine, modules, timesync
+from polyins import alignment, course, engine, modules, timesync
 from polyins.aiding.wheels import Joint, Rolling
 from polyins.alignment import Start
 from polyins.engine import Inputs, Outputs, Plan, State
@@ -57,6 +57,8 @@ class Prepared:
     outputs: Outputs
     work: tuple[Array, Array] | None
     """of the dense covariance"""
+    origin: Array | None
+    """mean vector from the IMUs to the origin of an array, m"""
     modules: Modules | None
     """of a rig with wheels"""
     rolling: Rolling | None
@@ -64,8 +66,19 @@ class Prepared:
 
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
+        fixes = self.inputs.fixes if len(self.inputs.fixes) else None
         engine.run_epochs(
-            self.state, self.plan, self.inputs, self.outputs, first, last, self.work, self.rolling, self.joined
+            self.state,
+            self.plan,
+            self.inputs,
+            self.outputs,
+            first,
+            last,
+            fixes,
+            self.work,
+            self.origin,
+            self.rolling,
+            self.joined,
         )
 
 
@@ -110,7 +123,10 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     if chosen:
         recording = recording.subset(chosen.all)
     aligned = timesync.align(recording.imus, bridge=not row.rolling)
-    start = alignment.find_start(recording, aligned)
+    if row.rolling and course.is_wanted(recording):
+        start = _start_on_course(row, recording, aligned)
+    else:
+        start = alignment.find_start(recording, aligned)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
     if len(aligned.time) < 2:
@@ -130,10 +146,22 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
         inputs=inputs,
         outputs=build_outputs(len(aligned.time), len(inputs.fix_time), len(members), plan.log_every),
         work=dense.workspace() if dense_covariance else None,
+        origin=_mean_to_origin(recording.rig),
         modules=None,
         rolling=None,
         joined=None,
     )
+
+
+def _start_on_course(row: Method, recording: Recording, aligned: Aligned) -> Start:
+    """Find the start of a vehicle whose heading is to come from GNSS."""
+    found = course.find(recording, lambda blind: run(blind, row.name))
+    known = replace(recording.start, heading=found.heading, heading_from="value")
+    start = alignment.find_start(replace(recording, start=known), aligned)
+    std = start.attitude_std
+    if recording.start.attitude_std is None:
+        std = np.array([std[0], std[1], found.std])
+    return replace(start, attitude_std=std, sources={**start.sources, "heading": found.source})
 
 
 def _prepare_rolling(
@@ -169,7 +197,7 @@ def _prepare_rolling(
         for k, std in enumerate(modules.mounting_std(members[first].imu, speed)):
             g[share.P + (share.INERTIAL + k) * (share.STRIDE + 1)] = std**2
     state = _state(recording, blocks, groups, spans, start, inputs)
-    engine.begin(state, plan, inputs.increments[0], state.clock[1], rolling)
+    engine.begin(state, plan, inputs.increments[0], state.clock[1], None, rolling)
     return Prepared(
         method=row,
         recording=recording,
@@ -180,7 +208,8 @@ def _prepare_rolling(
         plan=plan,
         inputs=inputs,
         outputs=build_outputs(len(aligned.time), len(inputs.fix_time), len(order), plan.log_every, errors=15),
-        work=dense.workspace() if dense_covariance else None,
+        work=dense.workspace(len(spans) if row.joined else 1) if dense_covariance else None,
+        origin=None,
         modules=chosen,
         rolling=rolling,
         joined=joined,
@@ -218,8 +247,12 @@ def build_state(
         g[share.WEIGHTS] = (last - first) / count
         _fill_share(g, members[first:last], start, recording.rig)
     state = _state(recording, blocks, groups, spans, start, inputs)
-    engine.begin(state, plan, inputs.increments[0], interval)
+    engine.begin(state, plan, inputs.increments[0], interval, _mean_to_origin(recording.rig))
     return state
+
+
+def _mean_to_origin(rig: Rig) -> Array:
+    return np.asarray(-np.mean([imu.position for imu in rig.imus], axis=0))
 
 
 def _state(
@@ -278,7 +311,6 @@ def build_plan(row: Method, recording: Recording, aligned: Aligned) -> Plan:
     return Plan(
         virtual=row.bank == "mean",
         shared_mechanization=row.shared_mechanization,
-        to_origin=-np.mean([imu.position for imu in recording.rig.imus], axis=0),
         gate_limit=np.inf if options.gate_limit is None else float(options.gate_limit),
         reopen_after=options.gate_reopen_after,
         gnss_snap=options.gnss_snap,
@@ -346,6 +378,9 @@ def _solution(run: Prepared, filter_s: float, first_call_s: float) -> Solution:
             reopened=(status & 3) == engine.REOPENED,
             velocity_rejected=status >= engine.VELOCITY_REJECTED,
         ),
+        mounting=log[:, 0, :, 12:] if run.rolling else None,
+        mounting_std=log[:, 1, :, 12:] if run.rolling else None,
+        faults=modules.silences(run.modules, recording, aligned) if run.modules else (),
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,

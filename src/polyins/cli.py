@@ -6,13 +6,16 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from polyins import __version__
 from polyins.errors import InputError
 from polyins.screen import announce_compilation, number, print_summaries, print_table, progress, say
+
+if TYPE_CHECKING:
+    from polyins.recording import Recording
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
@@ -165,6 +168,39 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
 
 
 @cli.command()
+@click.argument("config", type=FILE)
+@click.option("--out", type=FILE, default=None, help="File for the configuration; CONFIG's name and -calibrated.")
+@as_json_option
+def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
+    """Estimate from a drive how wheel and body IMUs are mounted, and write a configuration that says it."""
+    from polyins import results
+    from polyins.calibration import listing
+    from polyins.calibration.configuration import calibrated
+    from polyins.calibration.drive import calibrate as estimate
+    from polyins.io.files import write_bytes
+    from polyins.loading import build, read_config
+
+    with progress("reading"):
+        settings, document, warnings = read_config(config)
+        recording = build(settings, document, wheels_known=False)
+    with progress("calibrate"):
+        calibration = estimate(recording)
+    target = out or document.path.with_name(f"{document.path.stem}-calibrated.yaml")
+    moved = target.resolve().parent != document.path.resolve().parent
+    text = calibrated(document.values, settings, calibration, document.path.resolve().parent if moved else None)
+    results.make_folder(target.parent)
+    write_bytes(target, text.encode())
+    if as_json:
+        print(results.as_json(listing.document(calibration)))
+        return
+    print_table(recording.name, listing.COLUMNS, listing.rows(calibration))
+    for warning in (*warnings, *recording.warnings, *calibration.warnings):
+        say(f"warning: {warning}")
+    say(f"forward: {calibration.forward_from}")
+    say(f"configuration: {target}")
+
+
+@cli.command()
 @click.argument("solution", type=FILE)
 @click.option("--reference", type=FILE, required=True, help="A file with the true positions.")
 @as_json_option
@@ -203,11 +239,11 @@ def simulate(scenario: Path, out: Path, seed: int | None) -> None:
 @out_option("polyins-reproduced")
 @as_json_option
 def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
-    """Reproduce measured or published figures. TARGET: flights, array, consistency."""
+    """Reproduce measured or published figures. TARGET: flights, wid, array, consistency."""
     from polyins import results
     from polyins.reproduce import targets
 
-    function = targets.find_target(target)
+    function = targets.find_target(target, out)
     results.make_folder(out)
     announce_compilation()
     with progress(target) as update:

@@ -10,8 +10,12 @@ import os
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from polyins.errors import InputError
+
+if TYPE_CHECKING:
+    from polyins.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,21 @@ DATASETS = {
     ),
     "kfgins-parity": Dataset(
         summary="a simulated drive of 300 s in KF-GINS's formats, its truth, and what KF-GINS computes from it",
+        licence="made for polyins",
+        source="POLYINS_DATA",
+    ),
+    "wid": Dataset(
+        summary="a car with Xsens DOT on its four wheels and its body, 120 Hz, and its RTK position, 5 Hz",
+        licence="see the source",
+        source="https://github.com/ansfl/WID (figshare 10.6084/m9.figshare.27129999)",
+    ),
+    "whu-robot": Dataset(
+        summary="the track, 1 Hz, and odometer speed, 2 Hz, of a robot that drove 1.28 km with IMUs on wheels and body",
+        licence="see the source",
+        source="https://github.com/i2Nav-WHU/Wheel-INS",
+    ),
+    "wheelins-parity": Dataset(
+        summary="a simulated wheel IMU of 300 s in Wheel-INS's formats, its truth, and what Wheel-INS computes from it",
         licence="made for polyins",
         source="POLYINS_DATA",
     ),
@@ -75,8 +94,41 @@ def fetch(name: str) -> Path:
     if given:
         return given
     if dataset.address is None:
-        raise InputError(f"data set {name}: is not public; expected it as {name} in the folder that POLYINS_DATA names")
+        public = f"is not fetched by polyins, see {dataset.source}" if "://" in dataset.source else "is not public"
+        raise InputError(f"data set {name}: {public}; expected it as {name} in the folder that POLYINS_DATA names")
     return _download(name, dataset.address)
+
+
+def wid(trial: str, *, gnss: bool = False) -> Recording:
+    """Return a trial of the data set WID, such as `trial08`, as dead reckoning or with GNSS, on a local plane.
+
+    Raises InputError if the data set is not at hand or has no such trial.
+    """
+    from polyins.io.yaml_document import Document
+    from polyins.loading import load_document
+
+    folder = fetch("wid")
+    return load_document(Document(folder / trial, _wid_configuration(folder, trial, gnss)))
+
+
+def configuration(name: str, *, gnss: bool = False) -> str:
+    """Return polyins YAML for a recording of a data set, by a name such as `wid/trial08`.
+
+    Raises InputError if the data set has no such recording, or none that it describes.
+    """
+    from polyins.io.yaml_document import write_yaml
+
+    dataset, _, trial = name.partition("/")
+    _known(dataset)
+    if dataset != "wid" or not trial:
+        raise InputError(f"{name!r}: is no recording with a configuration; expected wid/trial08 or another trial")
+    return write_yaml(_wid_configuration(fetch("wid"), trial, gnss))
+
+
+def _wid_configuration(folder: Path, trial: str, gnss: bool) -> dict[str, Any]:
+    from polyins.io.wid import configuration
+
+    return configuration(folder, trial, gnss)
 
 
 def _known(name: str) -> Dataset:

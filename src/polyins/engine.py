@@ -57,8 +57,6 @@ class Plan(NamedTuple):
     virtual: bool
     """average the IMUs into one before navigation"""
     shared_mechanization: bool
-    to_origin: Array
-    """mean vector from the IMUs to the array origin, m, for a virtual IMU"""
     gate_limit: float
     reopen_after: int
     gnss_snap: float
@@ -110,6 +108,7 @@ def propagate(
     fraction: float,
     dt: float,
     work: tuple[Array, Array] | None,
+    origin: Array | None,
     rolling: Rolling | None,
     joined: Joint | None,
 ) -> None:
@@ -133,9 +132,11 @@ def propagate(
         share.error_model(g, dt, near)
         if work is None:
             share.predict(g, dt)
-        else:
+        elif joined is None:
             dense.predict(g, dt, work[0], work[1])
-    if joined is not None:
+    if work is not None and joined is not None:
+        dense.predict_joined(groups, members.shape[0], dt, joined.whole, work[0], work[1])
+    if work is None and joined is not None:
         for s in range(members.shape[0]):
             for other in range(s + 1, members.shape[0]):
                 joint.predict(groups, s, other, dt, joined.whole, joined.work)
@@ -145,9 +146,9 @@ def propagate(
         strapdown.remember(w)
     clock[0] += dt
     clock[1] = dt
-    if rolling is None:
+    if origin is not None:
         merge(blocks, groups, members, dt)
-    else:
+    if rolling is not None:
         fuse.fuse_shares(blocks, groups, members, dt)
         vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
 
@@ -194,31 +195,35 @@ def _measure_position(state: State, fix: Array) -> float:
 
 @kernel
 def aid_by_position(
-    state: State, plan: Plan, fix: Array, innovation: Array, rolling: Rolling | None, joined: Joint | None
+    state: State,
+    plan: Plan,
+    fix: Array,
+    innovation: Array,
+    origin: Array | None,
+    rolling: Rolling | None,
+    joined: Joint | None,
 ) -> int:
     """Update every share by a GNSS position; return what became of it."""
     blocks, groups, members, measurements = state.blocks, state.groups, state.members, state.measurements
-    if rolling is None:
+    nis = 0.0
+    if origin is not None:
         nis = _measure_position(state, fix)
-    elif joined is None:
-        nis = wheels.measure_position_each(fix, blocks, groups, members, measurements, state.near, rolling)
-    else:
-        nis = wheels.measure_position_all(fix, blocks, groups, members, measurements, state.near, rolling, joined)
+    if rolling is not None:
+        nis = wheels.measure_position(fix, blocks, groups, members, measurements, state.near, rolling, joined)
     _record(state, nis, innovation)
     status = ACCEPTED
     if not _passes_gate(state, plan, nis):
         state.counters[1] += 1
         if state.counters[1] <= plan.reopen_after:
             return REJECTED
-        if joined is None:
-            _reopen(state, plan, nis)
-        else:
+        _reopen(state, plan, nis)
+        if joined is not None:
             _reopen_all(state, nis, joined)
         status = REOPENED
     state.counters[1] = 0
-    if rolling is None:
+    if origin is not None:
         _correct(state)
-    else:
+    if rolling is not None:
         dt = state.clock[1]
         wheels.correct_by_position(blocks, groups, members, measurements, state.near, rolling, joined, dt)
     return status
@@ -314,16 +319,17 @@ def _correct(state: State) -> None:
 def aid(
     state: State,
     plan: Plan,
-    inputs: Inputs,
+    fixes: Array,
     outputs: Outputs,
     velocities: Array | None,
+    origin: Array | None,
     rolling: Rolling | None,
     joined: Joint | None,
 ) -> None:
     """Apply the next fix to the state as it is."""
     j = state.counters[0]
     state.counters[0] += 1
-    status = aid_by_position(state, plan, inputs.fixes[j], outputs.innovations[j], rolling, joined)
+    status = aid_by_position(state, plan, fixes[j], outputs.innovations[j], origin, rolling, joined)
     if velocities is not None:
         velocity = velocities[j]
         if status != REJECTED and velocity[3] > 0.0 and not aid_by_velocity(state, plan, velocity):
@@ -341,13 +347,15 @@ def load(blocks: Array, raw: Array) -> None:
                 w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
 
 
-def begin(state: State, plan: Plan, raw: Array, interval: float, rolling: Rolling | None = None) -> None:
+def begin(
+    state: State, plan: Plan, raw: Array, interval: float, origin: Array | None, rolling: Rolling | None = None
+) -> None:
     """Complete a state that holds positions, velocities, quaternions and errors.
 
     The increments that end at the start are the previous ones of the first epoch. Runs once, so it is not compiled.
     """
-    if plan.virtual:
-        fuse.average_increments(raw, interval, plan.to_origin, state.before, state.blocks)
+    if origin is not None and plan.virtual:
+        fuse.average_increments(raw, interval, origin, state.before, state.blocks)
     else:
         load(state.blocks, raw)
     for b in range(state.blocks.shape[0]):
@@ -426,13 +434,17 @@ def run_epochs(
     outputs: Outputs,
     first: int,
     last: int,
+    fixes: Array | None,
     work: tuple[Array, Array] | None,
+    origin: Array | None,
     rolling: Rolling | None,
     joined: Joint | None,
 ) -> None:
     """Take epochs first ... last - 1; the first of a recording is 1, since epoch 0 is the start.
 
-    A fix inside an interval splits it.
+    A fix inside an interval splits it. What is None is neither compiled nor done: `fixes` (of the inputs) without
+    GNSS; `work` but for dense covariances; `origin`, the mean vector from the IMUs of an array to its origin, m, on a
+    vehicle with wheels, and `rolling` without them; `joined` but for joined covariance blocks.
     """
     blocks, groups, members, near, clock = state.blocks, state.groups, state.members, state.near, state.clock
     time, increments, fix_time, counters = inputs.time, inputs.increments, inputs.fix_time, state.counters
@@ -444,21 +456,27 @@ def run_epochs(
     for k in range(first, last):
         now, end = time[k - 1], time[k]
         interval = end - now
-        if virtual:
-            fuse.average_increments(increments[k], interval, plan.to_origin, state.before, blocks)
-        else:
+        if rolling is not None:
+            wheels.fall_silent(k, now, rolling)
+        if not virtual:
             load(blocks, increments[k])
+        if origin is not None and virtual:
+            fuse.average_increments(increments[k], interval, origin, state.before, blocks)
         while next_fix < end - snap:
             if next_fix > now + snap:
                 dt = next_fix - now
-                propagate(blocks, groups, members, near, clock, shared, dt / interval, dt, work, rolling, joined)
+                propagate(
+                    blocks, groups, members, near, clock, shared, dt / interval, dt, work, origin, rolling, joined
+                )
                 now = next_fix
-            aid(state, plan, inputs, outputs, inputs.velocities, rolling, joined)
+            if fixes is not None:
+                aid(state, plan, fixes, outputs, inputs.velocities, origin, rolling, joined)
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
         fraction = (end - now) / interval
-        propagate(blocks, groups, members, near, clock, shared, fraction, end - now, work, rolling, joined)
+        propagate(blocks, groups, members, near, clock, shared, fraction, end - now, work, origin, rolling, joined)
         while next_fix <= end + snap:
-            aid(state, plan, inputs, outputs, inputs.velocities, rolling, joined)
+            if fixes is not None:
+                aid(state, plan, fixes, outputs, inputs.velocities, origin, rolling, joined)
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
         if rolling is not None:
             measurements = state.measurements

@@ -9,21 +9,25 @@ from typing import Any
 import numpy as np
 
 from polyins import datasets
-from polyins.config import Config, parse
+from polyins.config import Config, Rolling, parse
 from polyins.errors import InputError
-from polyins.io import checks, kf_gins_configuration
+from polyins.io import checks, clocks, kf_gins_configuration, wheel_checks, wheel_ins_configuration
 from polyins.io.imu_stream import read_imu
 from polyins.io.position_stream import read_gnss, read_reference
 from polyins.io.timing import outage_intervals, start_options
 from polyins.io.yaml_document import Document, read_yaml, write_yaml
-from polyins.recording import FilterOptions, Recording
+from polyins.recording import FilterOptions, Offset, Recording, RollingOptions
 from polyins.rig import Rig
+
+NOT_IN_FORCE = {"dataset", "imu_defaults"}
+"""keys that the others take in"""
 
 
 def load(path: str | Path) -> Recording:
-    """Read the recording that a configuration describes: polyins YAML or a KF-GINS file, told apart by content.
+    """Read the recording that a configuration describes: polyins YAML, or a KF-GINS or Wheel-INS file.
 
-    Raises InputError, before anything is computed, for a configuration or data that cannot be right.
+    They are told apart by content. Raises InputError, before anything is computed, for a configuration or data that
+    cannot be right.
     """
     config, document, warnings = read_config(path)
     recording = build(config, document)
@@ -37,25 +41,44 @@ def read_config(path: str | Path) -> tuple[Config, Document, tuple[str, ...]]:
     """
     document = read_yaml(path)
     warnings: tuple[str, ...] = ()
-    if kf_gins_configuration.recognizes(document):
-        values, warnings = kf_gins_configuration.translated(document)
-        document = Document(document.path, values)
+    for program in (wheel_ins_configuration, kf_gins_configuration):
+        if program.recognizes(document):
+            values, warnings = program.translated(document)
+            document = Document(document.path, values)
+            break
+    return _located(document), document, warnings
+
+
+def load_document(document: Document) -> Recording:
+    """Read the recording that the values of a configuration describe; raises InputError as `load` does."""
+    return build(_located(document), document)
+
+
+def _located(document: Document) -> Config:
     config = parse(document)
     with document.at(["dataset"]):
         folder = datasets.fetch(config.dataset) if config.dataset else document.path.parent.resolve()
-    return _with_absolute_paths(config, folder, document.path), document, warnings
+    return _with_absolute_paths(config, folder, document.path)
 
 
-def build(config: Config, document: Document) -> Recording:
-    """Read and check the streams that a configuration names."""
+def build(config: Config, document: Document, wheels_known: bool = True) -> Recording:
+    """Read and check the streams that a configuration names.
+
+    `wheels_known`: check that wheels turn as declared; what calibrates them needs not know yet.
+    """
+    notes = wheel_checks.check_settings(config, document)
     read = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
     imus, streams, warnings = zip(*read, strict=True)
-    notes = [text for texts in warnings for text in texts]
+    notes += [text for texts in warnings for text in texts]
+    config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
+    notes += [clocks.described(offset) for offset in offsets]
     span = checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})
     gnss = reference = geodetic = None
     if config.gnss:
         gnss, geodetic, texts = read_gnss(config.gnss, document, span)
         notes += texts
+    if wheels_known:
+        notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
     if config.reference:
         reference, kind, texts = read_reference(config.reference, document, span)
         geodetic = _one_kind(geodetic, kind, document.place(["reference"]))
@@ -75,9 +98,24 @@ def build(config: Config, document: Document) -> Recording:
         start=start,
         options=_filter_options(config),
         name=config.name,
-        config_text=write_yaml(config.model_dump(mode="json", exclude={"dataset", "imu_defaults"})),
+        config_text=_in_force(config, offsets),
         warnings=(*notes, *texts),
+        clock_offsets=offsets,
     )
+
+
+def _in_force(config: Config, offsets: tuple[Offset, ...]) -> str:
+    """Return the configuration as YAML, with the clock offsets that were found in the place of those to be found."""
+    found = {offset.name: offset.offset_s for offset in offsets}
+    imus = tuple(
+        imu.model_copy(update={"clock_offset_s": imu.clock_offset_s + found.get(imu.name, 0.0), "time_offset": None})
+        if imu.time_offset
+        else imu
+        for imu in config.imus
+    )
+    gnss = config.gnss and config.gnss.model_copy(update={"time_offset": None})
+    known = config.model_copy(update={"imus": imus, "gnss": gnss})
+    return write_yaml(known.model_dump(mode="json", exclude=NOT_IN_FORCE))
 
 
 def _filter_options(config: Config) -> FilterOptions:
@@ -86,6 +124,20 @@ def _filter_options(config: Config) -> FilterOptions:
         gate_reopen_after=config.filter.gate_reopen_after,
         gnss_snap=config.filter.gnss_snap_s,
         gravity=config.filter.gravity_m_s2,
+        rolling=_rolling_options(config.filter.rolling),
+    )
+
+
+def _rolling_options(rolling: Rolling) -> RollingOptions:
+    return RollingOptions(
+        speed_interval=rolling.speed_interval_s,
+        speed_window=rolling.speed_window_s,
+        predict=rolling.predict,
+        wheel_speed_std=np.array(rolling.wheel_speed_std_m_s),
+        body_speed_std=np.array(rolling.body_speed_std_m_s),
+        constraint_interval=rolling.constraint_interval_s,
+        constraint_std=rolling.constraint_std_m,
+        standstill=rolling.standstill,
     )
 
 

@@ -157,7 +157,8 @@ def rolling(
         drift=np.zeros((len(here), 3)),
         memory=memory,
         silent=np.full(len(here), -1.0),
-        given=np.zeros(wheels.GIVEN + 3),
+        back=np.full(len(here), -1.0),
+        given=np.zeros(wheels.GIVEN),
     )
 
 
@@ -244,3 +245,15 @@ def mounting_std(imu: Imu, speed: list[Imu]) -> Array:
     radii = np.array([one.wheel.radius_std for one in speed if one.wheel])
     own = imu.mount_std if imu.wheel is None else imu.wheel.lever_arm_std
     return np.array([np.sqrt(np.sum(radii**2)) / len(radii), own, own])
+
+
+def silences(modules: Modules, recording: Recording, aligned: Aligned) -> tuple[str, ...]:
+    """Return in words which IMUs were silent for how long, among those of `modules.all`."""
+    found = []
+    for i, imu in enumerate(recording.rig.imus):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], aligned.missing[:, i].astype(int), [0]])))
+        for first, end in zip(edges[::2], edges[1::2], strict=True):
+            begin, last = aligned.time[max(first - 1, 0)], aligned.time[end - 1]
+            driving = "the others carried it along" if len(modules.navigate) > 1 else "it coasted"
+            found.append(f"IMU {imu.name}: silent for {last - begin:.2f} s from {begin:.2f} s; {driving}")
+    return tuple(found)

@@ -137,6 +137,18 @@ class FilterOptions:
 
 
 @dataclass(frozen=True)
+class Offset:
+    """What was found to add to the stamps of one stream to put them on the clock of the others."""
+
+    name: str
+    """of the IMU, or GNSS"""
+    offset_s: float
+    std_s: float
+    correlation: float
+    """of the motions that were compared, at that offset"""
+
+
+@dataclass(frozen=True)
 class Recording:
     """Everything that a method needs: the rig, the streams on one clock, how to start, what to leave out."""
 
@@ -154,6 +166,8 @@ class Recording:
     config_text: str = ""
     """the configuration in force, as YAML"""
     warnings: tuple[str, ...] = ()
+    clock_offsets: tuple[Offset, ...] = ()
+    """what was found where the configuration says `time_offset: estimate`"""
 
     def subset(self, indices: Iterable[int]) -> Recording:
         """Return the recording with just the IMUs of those indices."""

@@ -78,6 +78,8 @@ WIDTH = 140
 
 FIGURES = (
     ("outages\nmax, m", ("outages", "horizontal_max_rms_m"), 2),
+    ("drift\n%", ("drift", "rate_percent"), 2),
+    ("end point\n%", ("drift", "end_percent"), 2),
     ("horizontal\nrms, m", ("reference", "horizontal_rms_m"), 2),
     ("vertical\nrms, m", ("reference", "vertical_rms_m"), 2),
     ("roll\ndeg", ("reference", "roll_rmse_deg"), 3),
@@ -88,23 +90,34 @@ FIGURES = (
 
 
 def print_summaries(title: str, summaries: Mapping[str, Mapping[str, Any]], ratios: Mapping[str, float | None]) -> None:
-    """Print the figures of one or more methods as a table, then their warnings."""
-    rows = []
-    for name, summary in summaries.items():
-        row = [name]
-        for _, keys, digits in FIGURES:
-            value: Any = summary
-            for key in keys:
-                value = value[key]
-            row.append(number(value, digits))
-        if ratios:
-            row.append("1" if name == "single" else number(ratios.get(name), 2))
-        rows.append(row)
-    columns = ["method", *(label for label, _, _ in FIGURES)] + (["ratio to\nsingle"] if ratios else [])
-    print_table(title, columns, rows)
+    """Print the figures of one or more methods as a table, then their warnings; what none of them has is left out."""
+    columns, cells = ["method"], [[name] for name in summaries]
+    for label, keys, digits in FIGURES:
+        values = [_figure(summary, keys) for summary in summaries.values()]
+        if any(value is not None for value in values):
+            columns.append(label)
+            for row, value in zip(cells, values, strict=True):
+                row.append(number(value, digits))
+    if ratios:
+        alone = next((name for name, summary in summaries.items() if "each" in summary), "single")
+        columns.append(f"ratio to\n{alone}")
+        for row in cells:
+            row.append("1" if row[0] == alone else number(ratios.get(row[0]), 2))
+    print_table(title, columns, cells)
     for name, summary in summaries.items():
         gnss = summary["gnss"]
         if gnss["rejected"]:
             say(f"{name}: {gnss['rejected']} of {gnss['fixes']} GNSS fixes rejected")
     for text in dict.fromkeys(text for summary in summaries.values() for text in summary["warnings"]):
         say(f"warning: {text}")
+
+
+def _figure(summary: Mapping[str, Any], keys: tuple[str, ...]) -> float | None:
+    from polyins.evaluation.summary import on_wheels
+
+    if keys[0] == "drift" and not on_wheels(summary):
+        return None
+    value: Any = summary
+    for key in keys:
+        value = value[key]
+    return value if value is None else float(value)

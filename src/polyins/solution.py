@@ -65,6 +65,13 @@ class Solution:
     imu_error_std: Array
     """shape (K, N, 12)"""
     innovations: Innovations
+    mounting: Array | None = None
+    """with wheels: estimated relative error of the wheel speed, and of a wheel's lever arm y and z (m) or of a body's mount
+    pitch and yaw (rad), shape (K, N, 3)"""
+    mounting_std: Array | None = None
+    """shape (K, N, 3); zero where it is not estimated"""
+    faults: tuple[str, ...] = ()
+    """IMUs that fell silent, in words"""
     start: dict[str, object] = field(default_factory=dict)
     """how the start was found: time, position, velocity, roll and pitch, heading, gyro bias"""
     filter_s: float = 0.0

@@ -174,3 +174,57 @@ def test_parquet_of_text(tmp_path: Path) -> None:
     parquet.write_table(pa.table({"t": ["now", "then"]}), tmp_path / "a.parquet")
     with pytest.raises(InputError, match=r"a\.parquet: cannot be read as numbers"):
         read_columns(tmp_path / "a.parquet", ["t"])
+
+
+def positions(folder: Path, **declared: object) -> TrackColumns:
+    """Write 40 rows at 10 Hz: row n (from 0) is at north n, has heading n deg, and is valid unless n ends in 7."""
+    n = np.arange(40.0)
+    rows = np.column_stack([100 + n / 10, n, 0 * n, 0 * n, n, n % 10 != 7])
+    write_rows(folder / "p.csv", rows, "t,n,e,d,heading,ok", ",")
+    position = {"names": ["n", "e", "d"], "frame": "north-east-down"}
+    return TrackColumns.model_validate({"position": position, **declared})
+
+
+def test_counted_rows_have_times_without_stamps(tmp_path: Path) -> None:
+    columns = positions(tmp_path, rows={"first": 4, "every": 10, "rate_hz": 10})
+    track = read_track(tmp_path / "p.csv", columns)
+    np.testing.assert_allclose(track.position[:, 0], [3, 13, 23, 33])
+    np.testing.assert_allclose(track.time, [0.3, 1.3, 2.3, 3.3])
+    assert "row 2" in track.source.place(1)
+
+
+def test_stamps_go_before_counting(tmp_path: Path) -> None:
+    columns = positions(tmp_path, time={"name": "t"}, rows={"every": 20, "rate_hz": 10})
+    np.testing.assert_allclose(read_track(tmp_path / "p.csv", columns).time, [100.0, 102.0])
+
+
+def test_rows_that_are_not_valid_are_left_out_with_all_that_belongs_to_them(tmp_path: Path) -> None:
+    columns = positions(tmp_path, time={"name": "t"}, valid="ok", heading={"name": "heading"})
+    track = read_track(tmp_path / "p.csv", columns)
+    kept = [n for n in range(40) if n % 10 != 7]
+    np.testing.assert_allclose(track.position[:, 0], kept)
+    assert track.attitude is not None
+    np.testing.assert_allclose(track.attitude[:, 2], np.array(kept) * DEG)
+    assert np.isnan(track.attitude[:, :2]).all()
+
+
+@pytest.mark.parametrize(
+    ("declared", "message"),
+    [
+        ({}, "is missing; expected it, or rows to count"),
+        ({"time": {"name": "t"}, "rows": {"first": 0, "rate_hz": 10}}, "greater than or equal to 1"),
+        (
+            {
+                "time": {"name": "t"},
+                "heading": {"name": "heading"},
+                "attitude": {"names": ["n", "e", "heading"]},
+            },
+            "is given with attitude",
+        ),
+    ],
+)
+def test_choices_of_rows_and_angles_that_are_not_clear(
+    declared: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        positions(tmp_path, **declared)

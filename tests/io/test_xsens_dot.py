@@ -95,15 +95,93 @@ def test_damage_is_bridged_with_a_warning(damage: str, length: int, tmp_path: Pa
     np.testing.assert_allclose(read.dtheta, whole.dtheta, atol=1e-12)
     np.testing.assert_array_equal(read.dvel, whole.dvel)
     assert len(read.warnings) == 1
-    assert f"line 7: {length} row(s) without a valid Gyr_X; interpolated" in read.warnings[0]
+    assert f"{length} destroyed row(s) repaired from its neighbours: line 7" in read.warnings[0]
 
 
-def test_longer_damage_is_refused(tmp_path: Path) -> None:
+def test_longer_damage_is_a_gap(tmp_path: Path) -> None:
+    whole = read_imu(write(tmp_path / "a.csv", rows(12)))
     values = rows(12)
     for row in range(5, 9):
         values[row][4] = "x"
-    with pytest.raises(InputError, match="line 7: 4 rows in a row without a valid Acc_X; expected at most 3"):
+    read = read_imu(write(tmp_path / "b.csv", values))
+    kept = [0, 1, 2, 3, 4, 9, 10, 11]
+    np.testing.assert_array_equal(read.time, whole.time[kept])
+    np.testing.assert_array_equal(read.dtheta, whole.dtheta[kept])
+    (warning,) = read.warnings
+    assert "4 destroyed row(s) left out, a gap: line 7, 8, 9, 10" in warning
+
+
+def test_mostly_damage_is_refused(tmp_path: Path) -> None:
+    values = rows(12)
+    for row in range(7):
+        values[row][4] = "x"
+    with pytest.raises(InputError, match="7 of 12 rows without valid Acc and Gyr; expected few"):
         read_imu(write(tmp_path / "a.csv", values))
+
+
+def test_a_late_halved_row_and_the_empty_one_after_it_are_put_right(tmp_path: Path) -> None:
+    whole = read_imu(write(tmp_path / "a.csv", rows(12)))
+    values = rows(12)
+    late, empty = values[6], values[7]
+    late[0] = int(str(late[0])) + STEP_US
+    late[4:] = [float(str(value)) / 2.0 for value in late[4:]]
+    empty[4:] = ["nan"] * 3 + ["-inf"] * 3
+    read = read_imu(write(tmp_path / "b.csv", values))
+    np.testing.assert_allclose(read.time, whole.time, atol=1e-9)
+    np.testing.assert_allclose(read.dtheta, whole.dtheta, atol=1e-12)
+    np.testing.assert_allclose(read.dvel, whole.dvel, atol=1e-12)
+    assert len(read.warnings) == 1
+
+
+def spinning(count: int = 40) -> list[list[object]]:
+    values = rows(count)
+    for k, row in enumerate(values):
+        row[7:] = [3.0 * np.sin(k), 2.0 * np.cos(k), 800.0 + 4.0 * np.sin(3.0 * k)]
+    return values
+
+
+def test_a_believable_rate_that_nothing_around_supports_is_damage(tmp_path: Path) -> None:
+    values = spinning()
+    values[20][7:] = [-171.0, -3.2, -7.1]
+    read = read_imu(write(tmp_path / "a.csv", values))
+    step = STEP_US * 1e-6
+    assert read.dtheta[20, 2] / DEG / step == pytest.approx(800.0, abs=5.0)
+    assert read.dtheta[20, 0] / DEG / step == pytest.approx(0.0, abs=4.0)
+    assert "1 destroyed row(s) repaired from its neighbours: line 22" in read.warnings[0]
+
+
+def test_a_shock_that_rings_is_not_damage(tmp_path: Path) -> None:
+    values = spinning()
+    for row, rate in zip(values[18:25], (760, 930, 640, 980, 700, 850, 780), strict=True):
+        row[9] = rate
+    read = read_imu(write(tmp_path / "a.csv", values))
+    assert read.warnings == ()
+    np.testing.assert_allclose(read.dtheta[19, 2], 930 * DEG * STEP_US * 1e-6)
+
+
+DAMAGED = {
+    ("02", "IMU2_radial"): 1,
+    ("09", "CAR"): 1,
+    ("09", "IMU2_radial"): 7,
+    ("09", "IMU3"): 7,
+    ("09", "IMU4"): 9,
+    ("09", "IMU4_radial"): 2,
+}
+
+
+@pytest.mark.parametrize(("trial", "name"), [*DAMAGED, ("02", "IMU2"), ("08", "IMU4"), ("02", "IMU1_radial")])
+def test_damage_of_a_real_car(trial: str, name: str, data_folder: Path) -> None:
+    """All of it is found, and no shock of the road is taken for it."""
+    read = read_imu(data_folder / "wid" / f"trial{trial}" / f"{name}.csv")
+    steps = np.diff(read.time)
+    real_gaps = 1 if (trial, name) == ("09", "IMU4") else 0
+    assert np.sum(np.abs(steps - STEP_US * 1e-6) > 1e-6) == real_gaps
+    repaired = [text for text in read.warnings if "destroyed" in text]
+    assert len(read.warnings) - len(repaired) == 1
+    if (trial, name) in DAMAGED:
+        assert f": {DAMAGED[trial, name]} destroyed row(s) repaired" in repaired[0]
+    else:
+        assert not repaired
 
 
 def test_missing_columns(tmp_path: Path) -> None:

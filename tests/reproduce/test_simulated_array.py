@@ -6,9 +6,9 @@ import pytest
 from polyins.reproduce import array
 
 
-def test_a_rigid_array_of_sixteen_gains_more_than_three_point_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(array, "SCENARIOS", {"chips": array.SCENARIOS["chips"]})
-    figures = array.reproduce()["polyins"]["chips"]
+def test_sixteen_independent_imus_gain_more_than_three_point_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(array, "SCENARIOS", {"independent": array.SCENARIOS["independent"]})
+    figures = array.reproduce()["polyins"]["independent"]
     ratios = np.array([figures["ratio"][name] for name in array.METHODS])
     assert len(figures["ratio_by_seed"]["enav-fusion"]) == 10
     assert np.all(ratios >= 3.2)

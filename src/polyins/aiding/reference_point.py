@@ -1,7 +1,7 @@
 """A point of the vehicle that is known from outside: the middle of the rear axle, or a GNSS antenna.
 
-The former is known as the mean of what all IMUs say of it, paper B (7)-(11). Each IMU predicts it as r + C l - C_nv (p - a): its position, the wheel's centre from it, its place p in the vehicle and
-the point's, a.
+The former is known as the mean of what all IMUs say of it, paper B (7)-(11). Each IMU predicts the point, a in vehicle
+axes, as r + C l - C_nv (p - a): its position, the wheel's centre from it, and its place p in the vehicle.
 """
 
 from __future__ import annotations

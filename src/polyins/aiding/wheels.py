@@ -15,8 +15,8 @@ from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, kernel
 from polyins.kernels.share import STATES, STRIDE
 
-SPEED, POINT, ZERO_VELOCITY, ZERO_RATE = 0, 1, 2, 3
-"""Kinds of measurement."""
+SPEED, POINT, ZERO_VELOCITY, ZERO_RATE = 0.0, 1.0, 2.0, 3.0
+"""Kinds of measurement, which stand in `Rolling.given`: as arguments they would be compiled one by one."""
 
 # places in `Rolling.settings`
 SPEED_INTERVAL, SPEED_WINDOW, POINT_INTERVAL, AT_END, STANDSTILL = range(5)
@@ -28,12 +28,18 @@ LAST_SPEED, LAST_POINT, OPENED, WATCHED, TRAVEL, LATERAL, STILL = range(7)
 MEMORY = 7
 
 # places in `Rolling.given`
-G_SPEED, G_LATERAL, G_DURATION, G_DT = range(4)
-G_KNOWN, G_POINT, G_VARIANCE = 4, 7, 10
-GIVEN = 13
+KIND, G_SPEED, G_LATERAL, G_DURATION, G_DT = range(5)
+G_KNOWN, G_POINT, G_VARIANCE, G_METRES = 5, 8, 11, 14
+GIVEN = 17
+
+STILL_SPEED = 0.01
+"""m/s"""
+
+LISTEN = 0.5
+"""s, from when a wheel's data are back until it speaks: about a turn of the wheel"""
 
 RESEED_POSITION, RESEED_VELOCITY, RESEED_TILT, RESEED_HEADING = 0.1, 0.2, 0.1, 0.02
-"""Standard deviations of a share that speaks again: m, m/s, rad, rad; the wheel's angle is found from its bearing."""
+"""Standard deviations of a share that speaks again: m, m/s, rad, rad."""
 
 
 class Rolling(NamedTuple):
@@ -56,6 +62,8 @@ class Rolling(NamedTuple):
     memory: Array
     silent: Array
     """(shares,): since when, s; below zero: not silent"""
+    back: Array
+    """(shares,): since when a silent one has data again, s; below zero: not"""
     given: Array
     """what the measurement that is being applied needs"""
 
@@ -82,15 +90,16 @@ def settle(blocks: Array, groups: Array, members: Array, rolling: Rolling, dt: f
 
 
 @kernel
-def _residual(kind: int, w: Array, lane: int, lent: vehicle.Matrix, rolling: Rolling, near: Array) -> vehicle.Three:
+def _residual(w: Array, lane: int, lent: vehicle.Matrix, rolling: Rolling, near: Array) -> vehicle.Three:
     given = rolling.given
+    kind = given[KIND]
     if kind == SPEED:
         if rolling.settings[AT_END] != 0.0:
             return wheel_speed.residual_at_end(w, lane, lent, given[G_LATERAL], given[G_SPEED], given[G_DT])
         return wheel_speed.residual_of_window(w, lane, given[G_SPEED], given[G_DURATION])
     if kind == POINT:
         known, point = given[G_KNOWN : G_KNOWN + 3], given[G_POINT : G_POINT + 3]
-        metres = given[GIVEN : GIVEN + 3]
+        metres = given[G_METRES : G_METRES + 3]
         return reference_point.residual(w, lane, lent, point, known, metres, near[0] != 0.0)
     if kind == ZERO_VELOCITY:
         return standstill.velocity_residual(w, lane)
@@ -98,8 +107,9 @@ def _residual(kind: int, w: Array, lane: int, lent: vehicle.Matrix, rolling: Rol
 
 
 @kernel
-def _design(kind: int, g: Array, w: Array, lane: int, rolling: Rolling, m: Array) -> None:
+def _design(g: Array, w: Array, lane: int, rolling: Rolling, m: Array) -> None:
     given = rolling.given
+    kind = given[KIND]
     if kind == SPEED:
         wheel_speed.design(g, w, lane, given[G_LATERAL], given[G_SPEED], m)
     elif kind == POINT:
@@ -111,16 +121,15 @@ def _design(kind: int, g: Array, w: Array, lane: int, rolling: Rolling, m: Array
 
 
 @kernel
-def measure(
-    kind: int, s: int, blocks: Array, groups: Array, members: Array, near: Array, rolling: Rolling, m: Array
-) -> None:
+def measure(s: int, blocks: Array, groups: Array, members: Array, near: Array, rolling: Rolling, m: Array) -> None:
     """Write design matrix, variances and residuals of a share: each member's own, and their mean."""
+    kind = rolling.given[KIND]
     g = groups[s]
     first, last = members[s, 0], members[s, 1]
     w, lane = blocks[first // LANES], first % LANES
-    metres = rolling.given[GIVEN : GIVEN + 3]
+    metres = rolling.given[G_METRES : G_METRES + 3]
     earth.metric(g[share.POSITION : share.POSITION + 3], near[0] != 0.0, metres)
-    _design(kind, g, w, lane, rolling, m)
+    _design(g, w, lane, rolling, m)
     if kind in (SPEED, POINT):
         vehicle_attitude.add_own(g, w, lane, m)
     lent = vehicle.lent_matrix(groups, rolling.lenders[s])
@@ -128,7 +137,7 @@ def measure(
         m[kalman.R + a] = rolling.noise[s, a] if kind == SPEED else rolling.given[G_VARIANCE + a]
         m[kalman.RESIDUAL + a] = 0.0
     for i in range(first, last):
-        z = _residual(kind, blocks[i // LANES], i % LANES, lent, rolling, near)
+        z = _residual(blocks[i // LANES], i % LANES, lent, rolling, near)
         for a in range(3):
             blocks[i // LANES, bank.CORRECTION + a * LANES + i % LANES] = z[a]
             m[kalman.RESIDUAL + a] += z[a] / (last - first)
@@ -169,7 +178,6 @@ def _member_correction(w: Array, lane: int, m: Array) -> None:
 
 @kernel
 def _aid_each(
-    kind: int,
     blocks: Array,
     groups: Array,
     members: Array,
@@ -181,7 +189,7 @@ def _aid_each(
     """One measurement of every share, paper B's distributed filter."""
     for s in range(members.shape[0]):
         if rolling.silent[s] < 0.0:
-            measure(kind, s, blocks, groups, members, near, rolling, measurements[s])
+            measure(s, blocks, groups, members, near, rolling, measurements[s])
             kalman.gain(groups[s], measurements[s])
     correct_each(blocks, groups, members, measurements, near, rolling, dt)
 
@@ -238,7 +246,6 @@ def correct_all(
 
 @kernel
 def _aid_all(
-    kind: int,
     blocks: Array,
     groups: Array,
     members: Array,
@@ -249,6 +256,7 @@ def _aid_all(
     dt: float,
 ) -> None:
     """One measurement of every share one after the other, or of the differences of their points, all states at once."""
+    kind = rolling.given[KIND]
     joint.gather(groups, members.shape[0], joined.whole)
     before = -1
     for s in range(members.shape[0]):
@@ -257,11 +265,11 @@ def _aid_all(
         if kind != POINT or before >= 0:
             m = measurements[s]
             joined.h[:] = 0.0
-            measure(kind, s, blocks, groups, members, near, rolling, m)
+            measure(s, blocks, groups, members, near, rolling, m)
             add_rows(s, 1.0, groups, rolling, m, joined.h)
             if kind == POINT:
                 other = measurements[before]
-                measure(kind, before, blocks, groups, members, near, rolling, other)
+                measure(before, blocks, groups, members, near, rolling, other)
                 add_rows(before, -1.0, groups, rolling, other, joined.h)
                 for a in range(3):
                     m[kalman.RESIDUAL + a] -= other[kalman.RESIDUAL + a]
@@ -275,7 +283,7 @@ def _aid_all(
 
 @kernel
 def _aid(
-    kind: int,
+    kind: float,
     variance: float,
     blocks: Array,
     groups: Array,
@@ -286,20 +294,23 @@ def _aid(
     joined: Joint | None,
     dt: float,
 ) -> None:
+    rolling.given[KIND] = kind
     for a in range(3):
         rolling.given[G_VARIANCE + a] = variance
         rolling.given[G_KNOWN + a] = groups[-1, share.POSITION + a]
         rolling.given[G_POINT + a] = 0.0
     if joined is None:
-        _aid_each(kind, blocks, groups, members, measurements, near, rolling, dt)
+        _aid_each(blocks, groups, members, measurements, near, rolling, dt)
     else:
-        _aid_all(kind, blocks, groups, members, measurements, near, rolling, joined, dt)
+        _aid_all(blocks, groups, members, measurements, near, rolling, joined, dt)
 
 
 @kernel
 def _stands(blocks: Array, members: Array, rolling: Rolling, duration: float) -> bool:
-    """Whether no IMU that speaks has turned during the window."""
+    """Whether no wheel has rolled and no IMU that speaks has turned during the window."""
     limit = rolling.settings[STILL_RATE] * duration
+    if not abs(rolling.memory[TRAVEL]) < STILL_SPEED * duration:
+        return False
     for s in range(members.shape[0]):
         if rolling.silent[s] < 0.0:
             w, t = blocks[members[s, 0] // LANES], bank.TURNED + members[s, 0] % LANES
@@ -363,7 +374,7 @@ def step(
         memory[TRAVEL] += rolling.travel[k, 0]
         for s in range(members.shape[0]):
             lent = vehicle.lent_matrix(groups, rolling.lenders[s])
-            for i in range(members[s, 0], members[s, 1]):
+            for i in range(members[s, 0], members[s, 1] if rolling.silent[s] < 0.0 else 0):
                 wheel_speed.watch(blocks[i // LANES], i % LANES, lent, memory[LATERAL], dt)
         if now - memory[LAST_SPEED] >= settings[SPEED_INTERVAL] - half:
             _end_window(now, blocks, groups, members, measurements, near, rolling, joined, dt)
@@ -373,12 +384,24 @@ def step(
         memory[OPENED], memory[LATERAL] = now, rolling.travel[k, 1]
         for s in range(members.shape[0]):
             lent = vehicle.lent_matrix(groups, rolling.lenders[s])
-            for i in range(members[s, 0], members[s, 1]):
+            for i in range(members[s, 0], members[s, 1] if rolling.silent[s] < 0.0 else 0):
                 wheel_speed.open_window(blocks[i // LANES], i % LANES, lent, memory[LATERAL])
     if members.shape[0] > 1 and now - memory[LAST_POINT] >= settings[POINT_INTERVAL] - half:
         memory[LAST_POINT] = now
         variance = settings[POINT_VARIANCE]
         _aid(POINT, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
+
+
+@kernel
+def fall_silent(k: int, now: float, rolling: Rolling) -> None:
+    """Note which shares give no data in epoch k, which begins at `now`, before it is navigated."""
+    if rolling.present.shape[0] > 0:
+        for s in range(rolling.silent.shape[0]):
+            if rolling.present[k, s] == 0:
+                rolling.back[s] = -1.0
+                if rolling.silent[s] < 0.0:
+                    rolling.silent[s] = now
+                    rolling.memory[WATCHED] = -1.0
 
 
 @kernel
@@ -393,43 +416,98 @@ def carry(
     joined: Joint | None,
     dt: float,
 ) -> None:
-    """Carry silent shares along with the vehicle, and let those speak again whose data are back."""
+    """Carry silent shares along with the vehicle, and let those speak again whose data are back.
+
+    How far a wheel turned in the meantime is known roughly. So an IMU on a wheel listens for a while before it speaks:
+    the force that it feels, on average gravity and the vehicle's acceleration, says at which angle it really is.
+    """
     _coast(groups, rolling.silent, near, dt)
     for s in range(members.shape[0]):
+        first, last = members[s, 0], members[s, 1]
         if rolling.present[k, s] == 0:
-            if rolling.silent[s] < 0.0:
-                rolling.silent[s] = now - dt
-                rolling.memory[WATCHED] = -1.0
-            _place(s, blocks, groups, members, near, rolling.travel[k, 0], dt)
+            for i in range(first, last):
+                _place(blocks[i // LANES], i % LANES, groups[-1], rolling.travel[k, 0], dt)
         elif rolling.silent[s] >= 0.0:
-            _reseed(s, groups, joined)
-            rolling.silent[s] = -1.0
-            rolling.memory[WATCHED] = -1.0
+            if rolling.back[s] < 0.0:
+                rolling.back[s] = now
+            listened = now - rolling.back[s]
+            for i in range(first, last):
+                _listen(blocks[i // LANES], i % LANES, groups[-1], listened, dt)
+            if listened >= LISTEN or blocks[first // LANES, bank.WHEEL + first % LANES] == 0.0:
+                for i in range(first, last):
+                    _find_angle(blocks[i // LANES], i % LANES, groups[-1], listened)
+                _reseed(s, groups, joined)
+                rolling.silent[s] = -1.0
+                rolling.memory[WATCHED] = -1.0
+        if rolling.silent[s] >= 0.0:
+            fuse.fuse_states(blocks, first, last, groups[s])
 
 
 @kernel
-def _place(s: int, blocks: Array, groups: Array, members: Array, near: Array, travel: float, dt: float) -> None:
-    """Put the members of a share where the vehicle has them, and turn a wheel about its axle as far as it rolled."""
-    merged = groups[-1]
+def _place(w: Array, lane: int, merged: Array, travel: float, dt: float) -> None:
+    """Put an IMU where the vehicle has it, and turn a wheel about its axle as far as it rolled."""
     v = vehicle.matrix_at(merged, share.VEHICLE)
-    forward = v[0] * merged[share.VELOCITY] + v[3] * merged[share.VELOCITY + 1] + v[6] * merged[share.VELOCITY + 2]
-    rolled = travel if math.isfinite(travel) else forward * dt
-    for i in range(members[s, 0], members[s, 1]):
-        w, lane = blocks[i // LANES], i % LANES
-        c = v if w[bank.WHEEL + lane] == 0.0 else vehicle.wheel_turned(w, lane, v, -rolled / w[bank.WHEEL + lane])
-        vehicle.put_attitude(w, lane, c)
-        ln, le, ld = vehicle.rotated(c, *vehicle.lever_to_wheel(w, lane))
-        p = bank.IN_VEHICLE + lane
-        pn, pe, pd = vehicle.rotated(v, w[p], w[p + LANES], w[p + 2 * LANES])
-        place = (
-            merged[share.POSITION] + (pn - ln) * w[bank.TO_LATITUDE + lane],
-            merged[share.POSITION + 1] + (pe - le) * w[bank.TO_LONGITUDE + lane],
-            merged[share.POSITION + 2] - (pd - ld),
-        )
-        for k in range(3):
-            w[bank.POSITION + k * LANES + lane] = place[k]
-            w[bank.VELOCITY + k * LANES + lane] = merged[share.VELOCITY + k]
-    fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
+    if w[bank.WHEEL + lane] == 0.0:
+        vehicle.put_attitude(w, lane, v)
+    else:
+        forward = v[0] * merged[share.VELOCITY] + v[3] * merged[share.VELOCITY + 1] + v[6] * merged[share.VELOCITY + 2]
+        rolled = travel if math.isfinite(travel) else forward * dt
+        vehicle.put_attitude(w, lane, vehicle.wheel_turned(w, lane, v, -rolled / w[bank.WHEEL + lane]))
+    _join(w, lane, merged, v)
+
+
+@kernel
+def _join(w: Array, lane: int, merged: Array, v: vehicle.Matrix) -> None:
+    """Give an IMU the position and the velocity that the vehicle has there."""
+    c = vehicle.lane_matrix(w, bank.MATRIX + lane)
+    ln, le, ld = vehicle.rotated(c, *vehicle.lever_to_wheel(w, lane))
+    p = bank.IN_VEHICLE + lane
+    pn, pe, pd = vehicle.rotated(v, w[p], w[p + LANES], w[p + 2 * LANES])
+    w[bank.POSITION + lane] = merged[share.POSITION] + (pn - ln) * w[bank.TO_LATITUDE + lane]
+    w[bank.POSITION + LANES + lane] = merged[share.POSITION + 1] + (pe - le) * w[bank.TO_LONGITUDE + lane]
+    w[bank.POSITION + 2 * LANES + lane] = merged[share.POSITION + 2] - (pd - ld)
+    for k in range(3):
+        w[bank.VELOCITY + k * LANES + lane] = merged[share.VELOCITY + k]
+
+
+@kernel
+def _listen(w: Array, lane: int, merged: Array, listened: float, dt: float) -> None:
+    """Turn an IMU on a wheel with its own data, the axle kept, and add up the force that it feels, in n."""
+    v = vehicle.matrix_at(merged, share.VEHICLE)
+    if w[bank.WHEEL + lane] == 0.0:
+        vehicle.put_attitude(w, lane, v)
+    else:
+        vehicle.put_attitude(w, lane, vehicle.wheel_turned(w, lane, v, 0.0))
+    _join(w, lane, merged, v)
+    # less what it feels for being off the wheel's centre
+    x, y, z = w[bank.DTHETA + lane] / dt, w[bank.DTHETA + LANES + lane] / dt, w[bank.DTHETA + 2 * LANES + lane] / dt
+    outward = vehicle.cross(x, y, z, *vehicle.cross(x, y, z, *vehicle.lever_to_wheel(w, lane)))
+    felt = vehicle.rotated(vehicle.lane_matrix(w, bank.AT_MATRIX + lane), outward[0], outward[1], outward[2])
+    for k in range(3):
+        if listened == 0.0:
+            w[bank.TRAVELLED + k * LANES + lane] = 0.0
+            w[bank.BEFORE_VELOCITY + k * LANES + lane] = merged[share.VELOCITY + k]
+        else:
+            w[bank.TRAVELLED + k * LANES + lane] += w[bank.DVEL_N + k * LANES + lane] + felt[k] * dt
+
+
+@kernel
+def _find_angle(w: Array, lane: int, merged: Array, listened: float) -> None:
+    """Turn an IMU on a wheel about the axle until the force that it felt is gravity and the vehicle's acceleration."""
+    if w[bank.WHEEL + lane] == 0.0:
+        return
+    v = vehicle.matrix_at(merged, share.VEHICLE)
+    # forward and down, which the axle is perpendicular to
+    fn, fe, fd = w[bank.TRAVELLED + lane], w[bank.TRAVELLED + LANES + lane], w[bank.TRAVELLED + 2 * LANES + lane]
+    an = merged[share.VELOCITY] - w[bank.BEFORE_VELOCITY + lane]
+    ae = merged[share.VELOCITY + 1] - w[bank.BEFORE_VELOCITY + LANES + lane]
+    ad = merged[share.VELOCITY + 2] - w[bank.BEFORE_VELOCITY + 2 * LANES + lane] - w[bank.GRAVITY + lane] * listened
+    felt_x, _, felt_z = vehicle.rotated_back(v, fn, fe, fd)
+    true_x, _, true_z = vehicle.rotated_back(v, an, ae, ad)
+    # about y, which turns z to x
+    angle = math.atan2(true_x, true_z) - math.atan2(felt_x, felt_z)
+    vehicle.put_attitude(w, lane, vehicle.wheel_turned(w, lane, v, angle))
+    _join(w, lane, merged, v)
 
 
 @kernel
@@ -474,7 +552,7 @@ def measure_position_each(
     total, speaking = 0.0, 0
     for s in range(members.shape[0]):
         if rolling.silent[s] < 0.0:
-            measure(POINT, s, blocks, groups, members, near, rolling, measurements[s])
+            measure(s, blocks, groups, members, near, rolling, measurements[s])
             kalman.gain(groups[s], measurements[s])
             total += kalman.normalized_innovation_squared(measurements[s])
             speaking += 1
@@ -504,7 +582,7 @@ def measure_position_all(
     z0, z1, z2 = 0.0, 0.0, 0.0
     for s in range(members.shape[0]):
         if rolling.silent[s] < 0.0:
-            measure(POINT, s, blocks, groups, members, near, rolling, m)
+            measure(s, blocks, groups, members, near, rolling, m)
             add_rows(s, 1.0 / speaking, groups, rolling, m, joined.h)
             z0 += m[kalman.RESIDUAL] / speaking
             z1 += m[kalman.RESIDUAL + 1] / speaking
@@ -515,7 +593,25 @@ def measure_position_all(
 
 
 @kernel
+def measure_position(
+    fix: Array,
+    blocks: Array,
+    groups: Array,
+    members: Array,
+    measurements: Array,
+    near: Array,
+    rolling: Rolling,
+    joined: Joint | None,
+) -> float:
+    """Measure a GNSS position; return the NIS."""
+    if joined is None:
+        return measure_position_each(fix, blocks, groups, members, measurements, near, rolling)
+    return measure_position_all(fix, blocks, groups, members, measurements, near, rolling, joined)
+
+
+@kernel
 def _know(fix: Array, rolling: Rolling) -> None:
+    rolling.given[KIND] = POINT
     for a in range(3):
         rolling.given[G_KNOWN + a] = fix[a]
         rolling.given[G_VARIANCE + a] = fix[3 + a]

@@ -7,17 +7,20 @@ from polyins.config.columns import (
     AccelColumns,
     AttitudeColumns,
     GyroColumns,
+    HeadingColumn,
     ImuColumns,
     PositionColumns,
+    RowChoice,
     StdColumns,
     TimeColumn,
     TrackColumns,
     VelocityColumns,
 )
-from polyins.config.fields import Number, Pair, PerAxis, Positive, Section, Spread, Triple
+from polyins.config.fields import NotNegative, Number, Pair, PerAxis, Positive, Section, Spread, Triple
 from polyins.config.file import Config, Filter, parse, validated
 from polyins.config.imu import NOISE_GRADES, ImuEntry, ImuSettings, InitialErrors, InitialStd, Noise
-from polyins.config.positions import GnssEntry, ReferenceEntry
+from polyins.config.positions import GeodeticPoint, GnssEntry, ReferenceEntry
+from polyins.config.rolling import Rolling, SpinAxis, WheelEntry
 from polyins.config.timing import Outages, OutageSchedule, Start, StartPosition
 
 __all__ = [
@@ -26,14 +29,17 @@ __all__ = [
     "AttitudeColumns",
     "Config",
     "Filter",
+    "GeodeticPoint",
     "GnssEntry",
     "GyroColumns",
+    "HeadingColumn",
     "ImuColumns",
     "ImuEntry",
     "ImuSettings",
     "InitialErrors",
     "InitialStd",
     "Noise",
+    "NotNegative",
     "Number",
     "OutageSchedule",
     "Outages",
@@ -42,7 +48,10 @@ __all__ = [
     "PositionColumns",
     "Positive",
     "ReferenceEntry",
+    "Rolling",
+    "RowChoice",
     "Section",
+    "SpinAxis",
     "Spread",
     "Start",
     "StartPosition",
@@ -51,6 +60,7 @@ __all__ = [
     "TrackColumns",
     "Triple",
     "VelocityColumns",
+    "WheelEntry",
     "parse",
     "validated",
 ]

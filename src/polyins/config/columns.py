@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from polyins.config.fields import Column, Section, ThreeColumns
+from polyins.config.fields import Column, Positive, Section, ThreeColumns, blame
 
 
 class TimeColumn(Section):
@@ -95,11 +95,35 @@ class AttitudeColumns(Section):
     """of all three"""
 
 
+class HeadingColumn(Section):
+    """Which column of a table holds the heading (clockwise), where there is no roll and pitch."""
+
+    name: Column
+    """the column"""
+    unit: Literal["deg", "rad"] = "deg"
+    """its unit"""
+
+
+class RowChoice(Section):
+    """Which rows of a table are used, of a receiver whose positions are repeated at the rate of another sensor."""
+
+    first: Annotated[int, Field(ge=1, strict=True)] = 1
+    """the first one that is used, counted from 1"""
+    every: Annotated[int, Field(ge=1, strict=True)] = 1
+    """one row of so many"""
+    rate_hz: Positive
+    """of all rows: without a column of stamps, row number n is at (n - 1) / rate_hz"""
+
+
 class TrackColumns(Section):
     """The columns of a table of positions."""
 
-    time: TimeColumn
-    """the stamps"""
+    time: TimeColumn | None = None
+    """the stamps; may be left out where rows are counted"""
+    rows: RowChoice | None = None
+    """which rows are used; all unless given"""
+    valid: Column | None = None
+    """a column that is 0 where a row is not to be used"""
     position: PositionColumns
     """the position"""
     std: StdColumns | None = None
@@ -110,3 +134,13 @@ class TrackColumns(Section):
     """its standard deviations"""
     attitude: AttitudeColumns | None = None
     """the attitude, of a reference"""
+    heading: HeadingColumn | None = None
+    """the heading, of a reference without roll and pitch"""
+
+    @model_validator(mode="after")
+    def _time_and_attitude_are_clear(self) -> Self:
+        if self.time is None and self.rows is None:
+            raise blame("time", "is missing; expected it, or rows to count")
+        if self.attitude is not None and self.heading is not None:
+            raise blame("heading", "is given with attitude; expected one of them")
+        return self

@@ -49,7 +49,14 @@ def _positive(value: float) -> float:
     return value
 
 
+def _not_below_zero(value: float) -> float:
+    if value < 0.0:
+        raise ValueError("expected a number that is not negative")
+    return value
+
+
 Number = Annotated[float, BeforeValidator(number)]
+NotNegative = Annotated[float, BeforeValidator(lambda value: _not_below_zero(number(value)))]
 Positive = Annotated[float, BeforeValidator(lambda value: _positive(number(value)))]
 Pair = Annotated[tuple[float, float], BeforeValidator(_two)]
 Triple = Annotated[tuple[float, float, float], BeforeValidator(_three)]
@@ -62,6 +69,14 @@ Column = str | int
 ThreeColumns = tuple[Column, Column, Column]
 
 ORIGIN = (0.0, 0.0, 0.0)
+
+AT_KEY = "at_key"
+"""Type of an error whose context names the `key` of the section that is to blame, and the `problem`."""
+
+
+def blame(key: str, problem: str) -> PydanticCustomError:
+    """Return the error to raise from a validator of a whole section for one of its keys."""
+    return PydanticCustomError(AT_KEY, "{problem}", {"key": key, "problem": problem})
 
 
 class Section(BaseModel):

@@ -8,9 +8,10 @@ from typing import Annotated, Any, Self, TypeVar
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from polyins.config.fields import Positive, Section, number
+from polyins.config.fields import AT_KEY, Positive, Section, number
 from polyins.config.imu import ImuEntry, ImuSettings
 from polyins.config.positions import GnssEntry, ReferenceEntry
+from polyins.config.rolling import Rolling
 from polyins.config.timing import Outages, Start
 from polyins.errors import InputError
 from polyins.io.yaml_document import Document, Key
@@ -30,6 +31,8 @@ class Filter(Section):
     """a fix nearer than this to an IMU epoch is applied at that epoch, s"""
     gravity_m_s2: Positive = FilterOptions.gravity
     """on a local tangent plane only, m/s^2"""
+    rolling: Rolling = Rolling()
+    """how wheels aid the filter"""
 
 
 class Config(Section):
@@ -124,6 +127,6 @@ def _explain(error: ErrorDetails, document: Document) -> str:
     if kind in ("tuple_type", "model_type", "dict_type"):
         return f"{place}: is {error['input']!r}; expected a {'list' if kind == 'tuple_type' else 'mapping'}"
     message = error["msg"].removeprefix("Value error, ")
-    if kind in ("unknown_key", "axes") or not message.startswith(("expected", "Input should be")):
+    if kind in ("unknown_key", AT_KEY) or not message.startswith(("expected", "Input should be")):
         return f"{place}: {message[0].lower()}{message[1:]}"
     return f"{place}: is {error['input']!r}; {message.replace('Input should be', 'expected')}"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from polyins.config.columns import ImuColumns
-from polyins.config.fields import ORIGIN, Number, PerAxis, Positive, Section, Spread, Triple
+from polyins.config.fields import ORIGIN, NotNegative, Number, PerAxis, Positive, Section, Spread, Triple, blame
+from polyins.config.rolling import WheelEntry
 
 NOISE_GRADES: dict[str, dict[str, float]] = {
     "consumer-mems": {
@@ -40,6 +40,8 @@ NOISE_GRADES: dict[str, dict[str, float]] = {
     },
 }
 """Typical figures by class of sensor. The first is an ICM-20602 as in the enav-fusion paper's public settings."""
+
+FORWARD_RIGHT_DOWN = ("x", "y", "z")
 
 
 def _axis_names(value: object) -> object:
@@ -110,20 +112,30 @@ class InitialStd(Section):
 class ImuSettings(Section):
     """What can be said of one IMU, or under `imu_defaults` of all."""
 
-    format: Literal["auto", "xsens-dot", "kf-gins", "table"] = "auto"
-    """of the file; auto: found from its content"""
+    format: Literal["auto", "xsens-dot", "kf-gins", "wheel-ins", "table"] = "auto"
+    """of the file; auto: found from its content, but for wheel-ins (binary rows of s, rad/s, m/s^2)"""
     columns: ImuColumns | None = None
     """of a table; without it the table has the columns that polyins writes"""
     rate_hz: Positive | None = None
     """take row number / rate_hz as the time and ignore the stamps"""
     clock_offset_s: Number = 0.0
     """added to the stamps, s"""
-    axes: Annotated[tuple[str, str, str], BeforeValidator(_axis_names)] = ("x", "y", "z")
+    time_offset: Literal["estimate"] | None = None
+    """estimate: what is left of the clock's offset is found from the motion that this IMU shares with the others"""
+    gyro_range_deg_s: Positive | None = None
+    """full scale of the gyro, deg/s: what reaches it is left out; without it that of the format, where it is known"""
+    axes: Annotated[tuple[str, str, str], BeforeValidator(_axis_names)] = FORWARD_RIGHT_DOWN
     """which sensor axes point forward, right and down in the array"""
     mount_deg: Triple = ORIGIN
     """roll, pitch, yaw of the sensor in the array, deg, after `axes`: C_ab = Rz(yaw) Ry(pitch) Rx(roll)"""
     position_m: Triple = ORIGIN
-    """from the array's origin: forward, right, down, m"""
+    """from the array's origin: forward, right, down, m; of a wheel: where its centre is"""
+    wheel: WheelEntry | None = None
+    """the wheel that it turns with, instead of axes and mount_deg"""
+    module: str = ""
+    """of the board that it shares with other chips at the same place"""
+    mount_std_deg: NotNegative = 0.0
+    """of pitch and yaw on a vehicle's body, deg; above zero the filter estimates them"""
     noise: Noise = Field(default_factory=lambda: Noise.model_validate("consumer-mems"))
     """how good the sensor is: a mapping, or just the name of a grade"""
     initial_errors: InitialErrors = InitialErrors()
@@ -139,9 +151,19 @@ class ImuSettings(Section):
             problem = f"axes {list(self.axes)} are left-handed"
         else:
             return self
-        raise PydanticCustomError(
-            "axes", "{problem}; expected right-handed ones, like [x, -y, -z]", {"key": "axes", "problem": problem}
-        )
+        raise blame("axes", f"{problem}; expected right-handed ones, like [x, -y, -z]")
+
+    @model_validator(mode="after")
+    def _wheel_or_mount(self) -> Self:
+        if self.wheel is None:
+            return self
+        if self.axes != FORWARD_RIGHT_DOWN:
+            raise blame("axes", "are given with a wheel; expected wheel.spin_axis alone")
+        if self.mount_deg != ORIGIN:
+            raise blame("mount_deg", "is given with a wheel; expected wheel.spin_axis and wheel.tilt_deg")
+        if self.mount_std_deg:
+            raise blame("mount_std_deg", "is given with a wheel; expected it of an IMU on the body")
+        return self
 
 
 class ImuEntry(ImuSettings):

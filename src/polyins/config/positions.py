@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
 
 from polyins.config.columns import TrackColumns
-from polyins.config.fields import ORIGIN, Number, Positive, Section, Spread, Triple
+from polyins.config.fields import ORIGIN, Number, Positive, Section, Spread, Triple, number
+
+
+class GeodeticPoint(Section):
+    """A point on Earth."""
+
+    latitude_deg: Annotated[float, BeforeValidator(number), Field(ge=-90.0, le=90.0)]
+    """deg"""
+    longitude_deg: Annotated[float, BeforeValidator(number), Field(ge=-360.0, le=360.0)]
+    """deg"""
+    height_m: Number = 0.0
+    """m above the ellipsoid"""
 
 
 class GnssEntry(Section):
@@ -19,6 +32,8 @@ class GnssEntry(Section):
     """of a table; without it the table has the columns that polyins writes"""
     clock_offset_s: Number = 0.0
     """added to the stamps, s"""
+    time_offset: Literal["estimate"] | None = None
+    """estimate: what is left of the clock's offset is found from the motion that the IMUs show too"""
     antenna_position_m: Triple = ORIGIN
     """of the antenna from the array's origin: forward, right, down, m"""
     position_std_m: Spread | None = None
@@ -29,6 +44,8 @@ class GnssEntry(Section):
     """what heights count from"""
     geoid_height_m: Number | None = None
     """height of the geoid above the ellipsoid, m; needed with sea-level heights"""
+    plane_origin: GeodeticPoint | None = None
+    """turn latitude and longitude into metres on the local plane that touches here"""
 
 
 class ReferenceEntry(Section):

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from numpy.typing import NDArray
+
 from polyins.evaluation.errors import Errors
+
+Array = NDArray[np.float64]
 
 
 def drift(errors: Errors | None, step: float = 100.0) -> dict[str, float | None]:
@@ -21,10 +25,23 @@ def drift(errors: Errors | None, step: float = 100.0) -> dict[str, float | None]
     result["distance_m"] = distance
     if distance > 0.0:
         result["end_percent"] = float(100.0 * errors.horizontal[-1] / distance)
+    _, rates = drift_rates(errors, step)
+    if rates.size:
+        result["rate_percent"] = float(np.mean(rates))
+    return result
+
+
+def drift_rates(errors: Errors, step: float = 100.0) -> tuple[Array, Array]:
+    """Return the multiples of `step` travelled, m, and the drift rate at each, percent, shape (K,) both."""
+    distance = float(errors.distance[-1]) if errors.distance.size else 0.0
     multiples = step * np.arange(1, int(distance / step) + 1)
     multiples = multiples[multiples <= distance]  # a quotient may be rounded up
-    if multiples.size:
-        reached = np.searchsorted(errors.distance, multiples)
-        so_far = np.maximum.accumulate(errors.horizontal)[reached]
-        result["rate_percent"] = float(100.0 * np.mean(so_far / multiples))
-    return result
+    reached = np.searchsorted(errors.distance, multiples)
+    return multiples, 100.0 * np.maximum.accumulate(errors.horizontal)[reached] / multiples
+
+
+def drift_curve(errors: Errors) -> Array:
+    """Return the maximum horizontal error so far over the distance so far, percent, shape (E,); NaN before any."""
+    rate = np.full(errors.distance.shape, np.nan)
+    so_far = np.maximum.accumulate(errors.horizontal)
+    return np.divide(100.0 * so_far, errors.distance, out=rate, where=errors.distance > 0.0)

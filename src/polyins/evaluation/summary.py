@@ -12,7 +12,7 @@ from polyins import __version__
 from polyins.evaluation.consistency import consistency
 from polyins.evaluation.drift import drift
 from polyins.evaluation.errors import Errors, compare_to_reference, rms
-from polyins.methods import find_method
+from polyins.methods import METHODS
 from polyins.evaluation.outages import Interval, outage_statistic, partly_covered
 from polyins.recording import Reference
 from polyins.solution import Innovations, Solution
@@ -51,7 +51,8 @@ def summarize(solution: Solution, reference: Reference | None, outages: Sequence
         "consistency": consistency(solution, errors),
         "gnss": _gnss(solution.innovations),
         "start": solution.start,
-        "faults": [],
+        "faults": list(solution.faults),
+        "mounting": _mounting(solution),
         "warnings": [*solution.warnings, *_warnings(solution, errors, outages)],
     }
     return {key: plain(value) for key, value in document.items()}
@@ -105,12 +106,18 @@ def figure(summary: Document | None) -> float | None:
     """
     if summary is None:
         return None
-    if find_method(summary["method"]).rolling and not summary["outages"]["count"]:
+    if on_wheels(summary) and not summary["outages"]["count"]:
         rate: float | None = summary["drift"]["rate_percent"]
         return rate
     of_outages: float | None = summary["outages"]["horizontal_max_rms_m"]
     of_all: float | None = summary["reference"]["horizontal_rms_m"]
     return of_outages if summary["outages"]["count"] else of_all
+
+
+def on_wheels(summary: Mapping[str, Any]) -> bool:
+    """Return whether wheels aided the run; not so of a method that is unknown, as a solution read from a file may be."""
+    row = METHODS.get(summary["method"].split("/")[0])
+    return row is not None and row.rolling
 
 
 def plain(value: object) -> Any:
@@ -134,6 +141,17 @@ def _gnss(innovations: Innovations) -> Document:
         "reopened": int(np.count_nonzero(innovations.reopened)),
         "velocities_rejected": int(np.count_nonzero(innovations.velocity_rejected)),
         "rejected_times_s": innovations.time[rejected],
+    }
+
+
+def _mounting(solution: Solution) -> Document:
+    """Return the last estimate of what is estimated of the mounting of each IMU, and its std."""
+    if solution.mounting is None or solution.mounting_std is None or not solution.imu_error_time.size:
+        return {}
+    return {
+        name: {"estimate": value, "std": std}
+        for name, value, std in zip(solution.imu_names, solution.mounting[-1], solution.mounting_std[-1], strict=True)
+        if std.any()
     }
 
 

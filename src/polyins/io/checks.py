@@ -23,6 +23,10 @@ MAX_TURN_RAD = 2.0
 MAX_RATE_RAD_S = 10.0
 """rms over a recording, of anything but a wheel"""
 UNUSUAL_RATE_RAD_S = 3.0
+WHEEL_RATE_RAD_S = 100.0
+"""rms over a recording, of a wheel"""
+FARTHEST_OFF_AXIS_M = 1.0
+"""what a sensor of unknown mount may be off the axis of a wheel"""
 RATES_HZ = (5.0, 20000.0)
 GAP_INTERVALS = 1.5
 JITTER = 0.2
@@ -32,8 +36,10 @@ MIN_COMMON_S = 2.0
 MAX_STD_M = 10000.0
 
 
-def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S) -> tuple[str, ...]:
-    """Check one IMU's rows, in the sensor's axes, and return warnings; `max_rate_rad_s`: rms turn rate allowed.
+def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m: float = 0.0) -> tuple[str, ...]:
+    """Check one IMU's rows, in the sensor's axes, and return warnings.
+
+    `max_rate_rad_s`: rms turn rate allowed; `off_axis_m`: how far from the axis of its turning it may sit, on a wheel.
 
     Raises InputError for fewer than two rows, NaN, stamps that do not increase, and values whose size shows a wrong
     unit.
@@ -43,7 +49,7 @@ def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S) -> tuple[st
     _check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel})
     _check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
     _check_rate(rows)
-    _check_accel_unit(rows)
+    _check_accel_unit(rows, off_axis_m)
     rate = _check_gyro_unit(rows, max_rate_rad_s)
     texts = _uneven(rows.time)
     if rate > UNUSUAL_RATE_RAD_S and max_rate_rad_s <= MAX_RATE_RAD_S:
@@ -110,7 +116,10 @@ def check_track(track: Track, what: str) -> tuple[str, ...]:
     if not len(track.time):
         raise InputError(f"{track.source.path}: no rows; expected positions for {what}")
     _check_finite(track.source, {"time": track.time, "position": track.position})
-    optional = {"velocity": track.velocity, "velocity std": track.velocity_std, "attitude": track.attitude}
+    angles = track.attitude
+    if angles is not None and np.isnan(angles[:, :2]).all():  # of a reference with heading alone
+        angles = angles[:, 2:]
+    optional = {"velocity": track.velocity, "velocity std": track.velocity_std, "attitude": angles}
     _check_finite(track.source, {name: block for name, block in optional.items() if block is not None})
     _check_order(track.source, track.time, "")
     if track.geodetic:
@@ -191,10 +200,11 @@ def _check_rate(rows: ImuRows) -> None:
         )
 
 
-def _check_accel_unit(rows: ImuRows) -> None:
+def _check_accel_unit(rows: ImuRows, off_axis_m: float) -> None:
     step = float(np.median(np.diff(rows.time)))
     size = float(np.median(np.linalg.norm(rows.dvel, axis=1))) / step
-    if _like_gravity(size):
+    spin = float(np.median(np.linalg.norm(rows.dtheta, axis=1))) / step
+    if GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1] + off_axis_m * spin**2:
         return
     unit, said = rows.accel_unit, f"the specific force comes out at {size:.4g} m/s^2"
     if unit == "m/s" and _like_gravity(size * step):
@@ -221,13 +231,14 @@ def _check_gyro_unit(rows: ImuRows, max_rate: float) -> float:
     turn = np.linalg.norm(rows.dtheta[1:], axis=1)
     rms = float(np.sqrt(np.mean((turn / np.diff(rows.time)) ** 2)))
     largest = int(np.argmax(turn))
-    if turn[largest] <= MAX_TURN_RAD and rms <= max_rate:
+    on_wheel = max_rate > MAX_RATE_RAD_S
+    if (on_wheel or turn[largest] <= MAX_TURN_RAD) and rms <= max_rate:
         return rms
     other = {"rad/s": "deg/s", "rad": "rad/s or deg/s", "deg": "deg/s", "deg/s": "another"}[rows.gyro_unit]
     raise InputError(
         f"{rows.source.place(largest + 1)}: with unit {rows.gyro_unit} the turn in one interval is "
         f"{turn[largest]:.3g} rad (rms rate {rms:.3g} rad/s); expected at most {MAX_TURN_RAD:g} rad and "
-        f"{max_rate:g} rad/s: is the unit {other}?"
+        f"{max_rate:g} rad/s: is the unit {other}?{'' if on_wheel else ' (On a wheel, it needs the section wheel.)'}"
     )
 
 

@@ -34,7 +34,7 @@ def convert(source: str | Path, target: str | Path) -> tuple[str, ...]:
 
 def _check(stream: Stream) -> tuple[str, ...]:
     if isinstance(stream, ImuRows):
-        return checks.check_imu(stream)
+        return checks.check_imu(stream, checks.WHEEL_RATE_RAD_S, checks.FARTHEST_OFF_AXIS_M)
     return checks.check_track(stream, "positions")
 
 

@@ -12,10 +12,16 @@ from polyins.errors import InputError
 from polyins.io import checks, kf_gins, table, xsens_dot
 from polyins.io.files import find
 from polyins.io.recognize import imu_format
-from polyins.io.rows import ImuRows
+from polyins.io.rows import ImuRows, intervals, without
+from polyins.io.wheel_mount import wheel, wheel_rotation
 from polyins.io.yaml_document import Document
 from polyins.recording import Array, ImuStream
 from polyins.rig import DEG, PPM, Imu, ImuErrors, NoiseGrade
+
+FULL = 0.999
+"""A rate above this part of the full scale has reached it."""
+MOST_SATURATED = 0.1
+"""of the rows"""
 
 
 def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuStream, tuple[str, ...]]:
@@ -23,15 +29,16 @@ def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuS
 
     Raises InputError for data and settings that cannot be right.
     """
-    place = document.place(["imus", index, "axes"])
     with document.at(["imus", index, "file"]):
         find(entry.file)
-    rows = _rows(entry, document.place(["imus", index]))
-    warnings = checks.check_imu(rows)
-    rotation = mount_rotation(entry.mount_deg) @ checks.axes_matrix(entry.axes)
+    rows, saturated = _within_range(_rows(entry, document.place(["imus", index])), entry)
+    warnings = (*_checked(rows, entry), *saturated)
+    rotation = sensor_rotation(entry)
     time = rows.time + entry.clock_offset_s
     stream = ImuStream(entry.name, time, _turned(rotation, rows.dtheta), _turned(rotation, rows.dvel))
-    checks.check_upright(entry.name, place, entry.axes, time, stream.dvel)
+    if entry.wheel is None:
+        place = document.place(["imus", index, "axes"])
+        checks.check_upright(entry.name, place, entry.axes, time, stream.dvel)
     with document.at(["imus", index]):
         imu = Imu(
             entry.name,
@@ -40,6 +47,9 @@ def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuS
             np.array(entry.position_m),
             _initial_errors(entry.initial_errors),
             _initial_std(entry.initial_std, noise_grade(entry.noise)),
+            wheel=None if entry.wheel is None else wheel(entry.wheel),
+            module=entry.module,
+            mount_std=entry.mount_std_deg * DEG,
         )
     return imu, stream, warnings
 
@@ -50,12 +60,50 @@ def _rows(entry: ImuEntry, place: str) -> ImuRows:
         kind = "table" if entry.columns else imu_format(entry.file)
     if entry.columns and kind != "table":
         raise InputError(f"{place}: columns are given and format is {kind}; expected columns with format table only")
+    if kind == "wheel-ins":
+        return kf_gins.read_rates(entry.file, entry.rate_hz)
     if kind == "xsens-dot":
         return xsens_dot.read_imu(entry.file, entry.rate_hz)
     if kind == "table":
         return table.read_imu(entry.file, entry.columns, entry.rate_hz)
     rows = kf_gins.read_imu(entry.file)
     return replace(rows, time=np.arange(len(rows.time)) / entry.rate_hz) if entry.rate_hz else rows
+
+
+def _checked(rows: ImuRows, entry: ImuEntry) -> tuple[str, ...]:
+    if entry.wheel is None:
+        return checks.check_imu(rows)
+    return checks.check_imu(rows, checks.WHEEL_RATE_RAD_S, entry.wheel.radius_m)
+
+
+def _within_range(rows: ImuRows, entry: ImuEntry) -> tuple[ImuRows, tuple[str, ...]]:
+    """Leave out rows whose rate reaches the gyro's full scale: how fast it turned then is not known."""
+    limit = entry.gyro_range_deg_s or rows.gyro_range_deg_s
+    if limit is None or len(rows.time) < 2:
+        return rows, ()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rates = np.abs(rows.dtheta / intervals(rows.time)[:, None]).max(axis=1) / DEG
+    saturated = rates >= FULL * limit
+    count = int(np.sum(saturated))
+    if not count:
+        return rows, ()
+    if count > MOST_SATURATED * len(rates):
+        raise InputError(
+            f"{rows.source.path}: {count} of {len(rates)} rows reach the gyro's full scale, {limit:g} deg/s; expected "
+            "few: gyro_range_deg_s or the unit is wrong, or the sensor does not suit"
+        )
+    first = rows.time[int(np.argmax(saturated))] + entry.clock_offset_s
+    return without(rows, saturated), (
+        f"{rows.source.path}: the gyro reaches its full scale, {limit:g} deg/s, in {count} row(s), the first at "
+        f"{first:.3f} s; they are left out",
+    )
+
+
+def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:
+    """Return the matrix that maps sensor vectors to the array's axes, on a wheel to the module's, shape (3, 3)."""
+    if entry.wheel is not None:
+        return wheel_rotation(entry.wheel)
+    return mount_rotation(entry.mount_deg) @ checks.axes_matrix(entry.axes)
 
 
 def _turned(rotation: Array, increments: Array) -> Array:

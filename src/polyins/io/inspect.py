@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.io.checks import GAP_INTERVALS, check_imu, check_track
+from polyins.io.checks import FARTHEST_OFF_AXIS_M, GAP_INTERVALS, WHEEL_RATE_RAD_S, check_imu, check_track
 from polyins.io.files import find
 from polyins.io.guess import Stream, read_stream
 from polyins.io.recognize import data_format
@@ -60,23 +60,28 @@ def _in_words(value: Any) -> str:
 def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
     """Say what `load` would refuse or warn of."""
     try:
-        found = check_imu(stream) if isinstance(stream, ImuRows) else check_track(stream, "positions")
+        if isinstance(stream, ImuRows):
+            found = check_imu(stream, WHEEL_RATE_RAD_S, FARTHEST_OFF_AXIS_M)
+        else:
+            found = check_track(stream, "positions")
     except InputError as error:
         return {"problems": [str(error)], "warnings": [*guesses, *stream.warnings]}
     return {"problems": [], "warnings": [*guesses, *found]}
 
 
 def _describe_configuration(path: str | Path) -> Facts:
-    from polyins.io.kf_gins_configuration import recognizes
+    from polyins.io import kf_gins_configuration, wheel_ins_configuration
     from polyins.io.yaml_document import read_yaml
     from polyins.loading import load
 
     recording = load(path)
     gnss, reference = recording.gnss, recording.reference
+    document = read_yaml(path)
+    programs = {"wheel-ins": wheel_ins_configuration, "kf-gins": kf_gins_configuration}
     return {
         "file": str(find(path)),
         "kind": "configuration",
-        "format": "kf-gins" if recognizes(read_yaml(path)) else "polyins",
+        "format": next((name for name, program in programs.items() if program.recognizes(document)), "polyins"),
         "name": recording.name,
         "geodetic": recording.geodetic,
         "imus": [

@@ -11,7 +11,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.io.files import find, read_bytes, write_bytes
-from polyins.io.rows import ImuRows, Source, Track
+from polyins.io.rows import ImuRows, Source, Track, intervals
 from polyins.recording import Array, GnssStream, ImuStream
 from polyins.rig import DEG
 
@@ -30,6 +30,22 @@ def read_imu(path: str | Path) -> ImuRows:
     text = is_text(content)
     rows = _numbers(path, content, {IMU_COLUMNS: "s, 3 rad, 3 m/s"}) if text else _binary(path, content)
     return ImuRows(Source(str(find(path)), 1 if text else None), rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+
+
+def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
+    """Read the IMU file of Wheel-INS: s, 3 rates (rad/s), 3 specific forces (m/s^2) in little-endian doubles.
+
+    Increments are rate x interval, as in that program; with `rate_hz` the stamps are ignored. Raises InputError for
+    text and for a file that ends within a row.
+    """
+    content = read_bytes(path)
+    if is_text(content):
+        raise InputError(f"{find(path)}: is text; expected rows of {IMU_COLUMNS} doubles (s, 3 rad/s, 3 m/s^2)")
+    rows = _binary(path, content)
+    time = np.arange(len(rows)) / rate_hz if rate_hz else rows[:, 0]
+    increments = rows[:, 1:] * intervals(time)[:, None]
+    source = Source(str(find(path)))
+    return ImuRows(source, time, increments[:, :3], increments[:, 3:], gyro_unit="rad/s", accel_unit="m/s^2")
 
 
 def read_gnss(path: str | Path) -> Track:

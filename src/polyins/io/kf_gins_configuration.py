@@ -8,18 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from polyins.errors import InputError
-from polyins.io.yaml_document import Document, Key
+from polyins.io.lab_configuration import Reader, noise, warnings
+from polyins.io.yaml_document import Document
 from polyins.rig import HOUR, MGAL
 
-NOISE = {
-    "arw": "angle_random_walk_deg_sqrt_h",
-    "vrw": "velocity_random_walk_m_s_sqrt_h",
-    "gbstd": "gyro_bias_deg_h",
-    "abstd": "accel_bias_mgal",
-    "gsstd": "gyro_scale_ppm",
-    "asstd": "accel_scale_ppm",
-}
 INITIAL_ERRORS = ("initgyrbias", "initaccbias", "initgyrscale", "initaccscale")
 INITIAL_STD = {"initbgstd": "gbstd", "initbastd": "abstd", "initsgstd": "gsstd", "initsastd": "asstd"}
 """and the noise that is taken where one is not given"""
@@ -38,17 +30,14 @@ def translated(document: Document) -> tuple[dict[str, Any], tuple[str, ...]]:
     The keys of noise and initial std may be one number or three. Raises InputError that names a key that is missing
     or of a wrong kind.
     """
-    read = _Reader(document)
+    read = Reader(document, "KF-GINS")
     position = read.three("initpos")
     end = read.number("endtime")
     imu = {
         "name": "imu",
         "file": read.text("imupath"),
         "format": "kf-gins",
-        "noise": {
-            **{ours: read.spread("imunoise", theirs) for theirs, ours in NOISE.items()},
-            "correlation_time_h": read.number("imunoise", "corrtime"),
-        },
+        "noise": noise(read),
         "initial_errors": _errors(*(read.three(key) for key in INITIAL_ERRORS)),
         "initial_std": _errors(
             *(
@@ -79,53 +68,7 @@ def translated(document: Document) -> tuple[dict[str, Any], tuple[str, ...]]:
         },
         "filter": {"gate_limit": None, "gnss_snap_s": GNSS_SNAP_S},
     }
-    return values, _warnings(document)
-
-
-class _Reader:
-    """Reads values by key and says which key is wrong."""
-
-    def __init__(self, document: Document) -> None:
-        self._document = document
-
-    def text(self, *keys: Key) -> str:
-        value = self._value(keys)
-        if not isinstance(value, str):
-            raise InputError(f"{self._document.place(keys)}: is {value!r}; expected a file name")
-        return value
-
-    def number(self, *keys: Key) -> float:
-        return self._as_number(self._value(keys), keys)
-
-    def three(self, *keys: Key) -> list[float]:
-        value = self._value(keys)
-        values = value if isinstance(value, list) else 3 * [value]
-        if len(values) < 3:
-            raise InputError(f"{self._document.place(keys)}: is {value!r}; expected three numbers, like [0, 0, 0]")
-        return [self._as_number(item, keys) for item in values[:3]]
-
-    def spread(self, *keys: Key) -> list[float]:
-        values = self.three(*keys)
-        if min(values) < 0.0:
-            raise InputError(f"{self._document.place(keys)}: is {values}; expected no negative number")
-        return values
-
-    def _value(self, keys: tuple[Key, ...]) -> Any:
-        value: Any = self._document.values
-        for key in keys:
-            value = value.get(key) if isinstance(value, dict) else None
-            if value is None:
-                raise InputError(f"{self._document.place(keys)}: is missing; expected it in a KF-GINS configuration")
-        return value
-
-    def _as_number(self, value: Any, keys: tuple[Key, ...]) -> float:
-        # That program converts the text of a value, so a number in quotes is one.
-        try:
-            if isinstance(value, bool):
-                raise ValueError
-            return float(value)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{self._document.place(keys)}: is {value!r}; expected a number") from error
+    return values, warnings(document)
 
 
 def _errors(
@@ -137,12 +80,3 @@ def _errors(
         "gyro_scale_ppm": gyro_scale,
         "accel_scale_ppm": accel_scale,
     }
-
-
-def _warnings(document: Document) -> tuple[str, ...]:
-    texts = []
-    if document.duplicate:
-        texts.append(f"{document.duplicate}; the first one counts")
-    if "outputpath" in document.values:
-        texts.append(f"{document.place(['outputpath'])}: is ignored; --out says where results go")
-    return tuple(texts)

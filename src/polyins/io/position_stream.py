@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from polyins.config import GnssEntry, ReferenceEntry
 from polyins.errors import InputError
+from polyins.geodesy import displacement
 from polyins.io import checks, kf_gins, rtklib, table
 from polyins.io.files import find
 from polyins.io.guess import read_stream
@@ -17,7 +18,7 @@ from polyins.io.recognize import data_format, track_format
 from polyins.io.rows import Track
 from polyins.io.yaml_document import Document
 from polyins.recording import Array, GnssStream, Reference
-from polyins.rig import check_lever_arm
+from polyins.rig import DEG, check_lever_arm
 from polyins.solution import Solution
 
 Span = tuple[float, float]
@@ -71,6 +72,7 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         raise InputError(f"{place}: {track.source.path} has no position std; expected position_std_m")
     checks.check_std(track.source, std)
     warnings += checks.check_within(track.source, "GNSS", track.time, span)
+    track = _on_plane(track, entry, document)
     kept = thinned(track.time, entry.rate_hz) if entry.rate_hz else np.arange(len(track.time))
     velocity = track.velocity if track.velocity_std is not None else None
     if track.velocity is not None and velocity is None:
@@ -83,6 +85,18 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         None if velocity is None or track.velocity_std is None else track.velocity_std[kept],
     )
     return stream, track.geodetic, warnings
+
+
+def _on_plane(track: Track, entry: GnssEntry, document: Document) -> Track:
+    """Convert geodetic positions to a local plane, if the entry gives its origin."""
+    origin = entry.plane_origin
+    if origin is None:
+        return track
+    if not track.geodetic:
+        place = document.place(["gnss", "plane_origin"])
+        raise InputError(f"{place}: given for positions in metres; expected it with latitude and longitude only")
+    point = np.array([origin.latitude_deg * DEG, origin.longitude_deg * DEG, origin.height_m])
+    return replace(track, position=displacement(track.position, point, True) * [1.0, 1.0, -1.0], geodetic=False)
 
 
 def thinned(time: Array, rate_hz: float) -> NDArray[np.intp]:

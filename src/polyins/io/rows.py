@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polyins.recording import Array
 
@@ -39,6 +40,8 @@ class ImuRows:
     """the unit in the file: rad or deg are increments, rad/s or deg/s rates"""
     accel_unit: str = "m/s"
     """m/s is increments, m/s^2 or g rates"""
+    gyro_range_deg_s: float | None = None
+    """full scale, where the format is that of one sensor"""
     warnings: tuple[str, ...] = ()
 
 
@@ -67,6 +70,31 @@ class Track:
     quality: dict[str, int] = field(default_factory=dict)
     """how many fixes of each kind the receiver reports"""
     warnings: tuple[str, ...] = ()
+
+    def at_rows(self, rows: NDArray[np.intp]) -> Track:
+        """Return the track with just those rows; messages then name rows, not lines."""
+        blocks = ("position_std", "velocity", "velocity_std", "attitude")
+        given = {name: block[rows] for name in blocks if (block := getattr(self, name)) is not None}
+        source = Source(self.source.path)
+        return replace(self, source=source, time=self.time[rows], position=self.position[rows], **given)
+
+
+LONGEST_BRIDGE = 3
+"""Rows in a row that can be left out while the one after them stands for their time as well."""
+
+
+def without(rows: ImuRows, bad: NDArray[np.bool_]) -> ImuRows:
+    """Leave out the rows in `bad`, shape (T,).
+
+    After a hole of up to 3 rows the next row's rates are taken for the whole time since the row before the hole; longer
+    holes are gaps.
+    """
+    kept = np.flatnonzero(~bad)
+    holes = np.diff(kept, prepend=kept[:1] - 1) - 1
+    bridged = (holes > 0) & (holes <= LONGEST_BRIDGE) & (np.arange(len(kept)) > 0)
+    own, time = intervals(rows.time)[kept], rows.time[kept]
+    factor = np.where(bridged, intervals(time) / own, 1.0)[:, None]
+    return replace(rows, time=time, dtheta=rows.dtheta[kept] * factor, dvel=rows.dvel[kept] * factor)
 
 
 def intervals(time: Array) -> Array:

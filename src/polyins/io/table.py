@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,10 +78,35 @@ def read_track(path: str | Path, columns: TrackColumns | None = None) -> Track:
         "attitude": columns.attitude,
     }
     given = {name: group for name, group in groups.items() if group is not None}
-    wanted: list[Column] = [columns.time.name, *(name for group in given.values() for name in group.names)]
-    source, values = read_columns(path, wanted)
-    found = {name: np.column_stack(values[1 + 3 * n : 4 + 3 * n]) for n, name in enumerate(given)}
-    return _track(source, values[0] * SECONDS[columns.time.unit], found, columns)
+    wanted: list[Column] = [name for group in given.values() for name in group.names]
+    named = (columns.time, columns.heading)
+    single: list[Column | None] = [None if group is None else group.name for group in named] + [columns.valid]
+    source, values = read_columns(path, [*wanted, *(column for column in single if column is not None)])
+    found = {name: np.column_stack(values[3 * n : 3 * n + 3]) for n, name in enumerate(given)}
+    rest = iter(values[len(wanted) :])
+    time, heading, valid = (None if column is None else next(rest) for column in single)
+    track = _track(source, _stamps(time, columns, len(values[0])), found, columns)
+    if heading is not None and columns.heading is not None:
+        unknown = np.full((len(heading), 2), np.nan)
+        track = replace(track, attitude=np.column_stack([unknown, heading * RADIANS[columns.heading.unit]]))
+    return _used(track, columns, valid)
+
+
+def _stamps(time: Array | None, columns: TrackColumns, rows: int) -> Array:
+    if time is not None and columns.time is not None:
+        return time * SECONDS[columns.time.unit]
+    assert columns.rows is not None
+    return np.arange(rows) / columns.rows.rate_hz
+
+
+def _used(track: Track, columns: TrackColumns, valid: Array | None) -> Track:
+    """Leave out the rows that are not to be used; the source then names rows instead of lines."""
+    kept = np.arange(len(track.time))
+    if columns.rows is not None:
+        kept = kept[columns.rows.first - 1 :: columns.rows.every]
+    if valid is not None:
+        kept = kept[valid[kept] != 0.0]
+    return track if len(kept) == len(track.time) else track.at_rows(kept)
 
 
 def written_columns(path: str | Path) -> TrackColumns:

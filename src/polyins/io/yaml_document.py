@@ -88,6 +88,7 @@ def write_yaml(values: dict[str, Any]) -> str:
     writer = YAML()
     writer.default_flow_style = None
     writer.width = 120
+    writer.representer.ignore_aliases = lambda value: True
     text = StringIO()
     writer.dump(values, text)
     return text.getvalue()

@@ -64,43 +64,50 @@ def _attitude_std_deg(run: Run) -> Array:
     return np.degrees(np.sqrt(euler_variance(euler, run.solution.phi_covariance)))
 
 
-def _figure(scene: Scene, curves: Sequence[Curves], rows: Sequence[str]) -> Figure:
-    figure = stacked(rows)
-    points = points_per_trace(3 * len(rows) * len(curves))
+def _figure(scene: Scene, curves: Sequence[Curves], titles: Sequence[str]) -> Figure:
+    axes = _axes_to_draw(curves)
+    figure = stacked([titles[axis] for axis in axes])
+    points = points_per_trace(3 * len(axes) * len(curves))
     opacity = 0.14 / np.sqrt(len(curves))
-    for row in range(len(rows)):
-        bands = [trace for one in curves for trace in _band(scene, one, row, points, opacity)]
-        lines = [_line(scene, one, row, points) for one in curves]
-        figure.add_traces([*bands, *lines], rows=row + 1, cols=1)
-    mark_time(figure, scene.duration, scene.outages)
-    return finish(figure, height=640)
+    for row, axis in enumerate(axes, 1):
+        bands = [trace for one in curves for trace in _band(scene, one, axis, points, opacity)]
+        lines = [_line(scene, one, axis, points, legend=row == 1) for one in curves]
+        figure.add_traces([*bands, *lines], rows=row, cols=1)
+    mark_time(figure, scene.duration, scene.shades)
+    return finish(figure, height=120 + 175 * len(axes))
 
 
-def _line(scene: Scene, curves: Curves, row: int, points: int) -> Any:
+def _axes_to_draw(curves: Sequence[Curves]) -> list[int]:
+    """Return the axes whose errors are known; all where none is, for the bands' sake."""
+    known = [axis for axis in range(3) if any(np.isfinite(one.errors[:, axis]).any() for one in curves)]
+    return known or [0, 1, 2]
+
+
+def _line(scene: Scene, curves: Curves, axis: int, points: int, legend: bool) -> Any:
     from plotly.graph_objects import Scatter
 
     run = curves.run
-    drawn = kept_for_display(curves.errors[:, [row]], points)
+    drawn = kept_for_display(curves.errors[:, [axis]], points)
     return Scatter(
         x=scene.since_start(run.solution.time[drawn]),
-        y=curves.errors[drawn, row].astype(np.float32),
+        y=curves.errors[drawn, axis].astype(np.float32),
         name=run.label,
         legendgroup=run.label,
-        showlegend=row == 0,
+        showlegend=legend,
         mode="lines",
         line={"color": run.colour, "dash": run.dash, "width": 1.4},
     )
 
 
-def _band(scene: Scene, curves: Curves, row: int, points: int, opacity: float) -> Iterator[Any]:
+def _band(scene: Scene, curves: Curves, axis: int, points: int, opacity: float) -> Iterator[Any]:
     from plotly.graph_objects import Scatter
 
     run = curves.run
-    drawn = kept_for_display(curves.std[:, [row]], points)
+    drawn = kept_for_display(curves.std[:, [axis]], points)
     for sign, fill in ((1.0, None), (-1.0, "tonexty")):
         yield Scatter(
             x=scene.since_start(run.solution.time[drawn]),
-            y=(sign * 3.0 * curves.std[drawn, row]).astype(np.float32),
+            y=(sign * 3.0 * curves.std[drawn, axis]).astype(np.float32),
             legendgroup=run.label,
             showlegend=False,
             mode="lines",

@@ -35,7 +35,7 @@ def imu_error_figure(scene: Scene) -> Figure | None:
             traces = list(_traces(scene, run, state, points))
             figure.add_traces(traces, rows=state // 3 + 1, cols=state % 3 + 1)
             owners += [index] * len(traces)
-    mark_time(figure, scene.duration, scene.outages, columns=3)
+    mark_time(figure, scene.duration, scene.shades, columns=3)
     finish(figure, height=860)
     most = int(np.argmax([len(run.solution.imu_names) for run in runs]))
     choose(figure, [run.label for run in runs], owners, first=most)

@@ -41,7 +41,7 @@ def innovation_figure(scene: Scene) -> Figure | None:
             traces = [_three_sigma(scene, run, row, points), *_residuals(scene, run, row, limits[row], points)]
             figure.add_traces(traces, rows=row + 1, cols=1)
             owners += [index] * len(traces)
-    mark_time(figure, scene.duration, scene.outages)
+    mark_time(figure, scene.duration, scene.shades)
     finish(figure, height=640)
     for row, limit in enumerate(limits, start=1):
         figure.update_yaxes(range=[-1.05 * limit, 1.05 * limit], row=row)

@@ -10,6 +10,7 @@ from polyins import __version__
 from polyins.evaluation.summary import Document
 from polyins.io.files import whole
 from polyins.recording import Recording
+from polyins.report.drift_curves import drift_figure
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
 from polyins.report.imu_errors import imu_error_figure
 from polyins.report.innovations import innovation_figure
@@ -22,16 +23,21 @@ from polyins.solution import Solution
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-SHADED = "Outages are shaded."
 BANDS = "Bands are three times the standard deviation that the filter states."
 
 SECTIONS: tuple[tuple[str, str, str, Callable[[Scene], Figure | None]], ...] = (
     ("trajectory", "Trajectory", "Metres from the start; drag to zoom, double-click to return.", trajectory_figure),
     ("outages", "Outages", "The greatest horizontal error inside each GNSS outage.", outage_figure),
-    ("position", "Position errors", f"{BANDS} {SHADED}", position_figure),
-    ("velocity", "Velocity errors", f"{BANDS} {SHADED}", velocity_figure),
-    ("attitude", "Attitude errors", f"{BANDS} {SHADED}", attitude_figure),
-    ("imus", "Estimated IMU errors", f"A click in the legend hides an IMU. {SHADED}", imu_error_figure),
+    (
+        "drift",
+        "Drift over distance",
+        "The greatest horizontal error so far over the distance so far. The dots are what the mean rate is taken of.",
+        drift_figure,
+    ),
+    ("position", "Position errors", BANDS, position_figure),
+    ("velocity", "Velocity errors", BANDS, velocity_figure),
+    ("attitude", "Attitude errors", BANDS, attitude_figure),
+    ("imus", "Estimated IMU errors", "A click in the legend hides an IMU.", imu_error_figure),
     (
         "innovations",
         "Innovations",
@@ -40,6 +46,7 @@ SECTIONS: tuple[tuple[str, str, str, Callable[[Scene], Figure | None]], ...] = (
         innovation_figure,
     ),
 )
+OVER_TIME = ("position", "velocity", "attitude", "imus", "innovations")
 WIDE = ("imus",)
 """figures that scroll sideways on a narrow screen"""
 NO_BUTTONS = ("sendChartToCloud", "select2d", "lasso2d")
@@ -67,7 +74,7 @@ def write_report(
         sections=_sections(scene),
         config=recording.config_text,
         plotly=_plotly_script(),
-        single_is_pooled=comparison is not None and "single" in runs,
+        pooled=next((name for name in runs if comparison and "each" in comparison["methods"][name]), None),
     )
     with whole(path) as beside:
         beside.write_text(text, encoding="utf-8")
@@ -75,11 +82,25 @@ def write_report(
 
 def _sections(scene: Scene) -> list[dict[str, Any]]:
     drawn = ((name, title, caption, draw(scene)) for name, title, caption, draw in SECTIONS)
+    shaded = _what_is_shaded(scene)
     return [
-        {"id": name, "title": title, "caption": caption, "plot": _html(figure, name), "wide": name in WIDE}
+        {
+            "id": name,
+            "title": title,
+            "caption": f"{caption} {shaded}" if name in OVER_TIME else caption,
+            "plot": _html(figure, name),
+            "wide": name in WIDE,
+        }
         for name, title, caption, figure in drawn
         if figure is not None
     ]
+
+
+def _what_is_shaded(scene: Scene) -> str:
+    silent = dict.fromkeys(shade.name for shade in scene.shades if shade.name)
+    outages = "Outages are shaded." if scene.outages else ""
+    gaps = f"Gray: no data from {', '.join(silent)}." if silent else ""
+    return f"{outages} {gaps}".strip()
 
 
 def _html(figure: Figure, name: str) -> str:

@@ -22,6 +22,7 @@ REFERENCE = "#1F2430"
 FIXES = "#9AA3B2"
 REJECTED = "#C0272D"
 OUTAGE = "rgba(235, 190, 40, 0.20)"
+SILENCE = "rgba(110, 120, 140, 0.22)"
 OUTAGE_TRACK = "rgba(235, 190, 40, 0.65)"
 FEW_IMUS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#1F2430", "#8C7A00")
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash")

@@ -9,13 +9,30 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.evaluation.attitude import rotation_matrices
 from polyins.evaluation.errors import Errors, compare_to_reference
-from polyins.evaluation.summary import Document
+from polyins.evaluation.summary import Document, on_wheels
+from polyins.geodesy import metres_per_unit
 from polyins.recording import Recording
-from polyins.report.palette import method_styles
+from polyins.report.palette import OUTAGE, SILENCE, method_styles
 from polyins.solution import Solution
+from polyins.timesync import GAP
 
 Array = NDArray[np.float64]
+
+LEAST_SILENCE = 0.1
+"""s: a shorter gap in an IMU's data is too narrow to see"""
+
+
+@dataclass(frozen=True)
+class Shade:
+    """A stretch of time to mark, s since the start."""
+
+    begin: float
+    end: float
+    colour: str
+    name: str
+    """of the IMU that is silent; empty: a GNSS outage"""
 
 
 @dataclass(frozen=True)
@@ -33,6 +50,11 @@ class Run:
     def label(self) -> str:
         """The name as Plotly takes it, which reads some HTML."""
         return escape(self.name)
+
+    @property
+    def on_wheels(self) -> bool:
+        """Whether wheels aided it."""
+        return on_wheels(self.summary)
 
     def at_epochs(self, part: Callable[[Errors], Array | None]) -> Array:
         """Spread a part of the errors over the solution's epochs, shape (T, 3), with NaN where it is unknown."""
@@ -82,6 +104,28 @@ class Scene:
     def outages(self) -> list[tuple[float, float]]:
         """The outages, s since the start."""
         return [(begin - self.start, end - self.start) for begin, end in self.recording.outages]
+
+    @property
+    def shades(self) -> list[Shade]:
+        """What figures over time mark: the outages, and gaps in the data of IMUs that navigate."""
+        navigators = {name for run in self.runs for name in run.solution.imu_names}
+        found = [Shade(begin, end, OUTAGE, "") for begin, end in self.outages]
+        for stream in self.recording.imus:
+            step = np.diff(stream.time)
+            gaps = np.flatnonzero(step > max(LEAST_SILENCE, GAP * np.median(step))) if stream.name in navigators else []
+            for k in gaps:
+                begin, end = (float(time) - self.start for time in stream.time[[k, k + 1]])
+                if end > 0.0 and begin < self.duration:
+                    found.append(Shade(begin, end, SILENCE, escape(stream.name)))
+        return found
+
+    def at_reference_point(self, run: Run) -> Array:
+        """Return a run's positions at the point that the reference follows, shape (T, 3)."""
+        solution, reference = run.solution, self.recording.reference
+        if reference is None:
+            return solution.position
+        moved = rotation_matrices(solution.attitude) @ (reference.lever_arm - solution.point)
+        return solution.position + moved / metres_per_unit(solution.position, solution.geodetic)
 
     @property
     def origin(self) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from polyins.report.palette import OUTAGE
+from polyins.report.scene import Shade
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -68,24 +68,23 @@ def stacked(rows: Sequence[str], columns: int = 1, column_titles: Sequence[str] 
     return figure
 
 
-def mark_time(figure: Figure, duration: float, outages: Sequence[tuple[float, float]], columns: int = 1) -> None:
-    """Let the time axes span the run, and shade the outages, s since the start, behind all rows of each column."""
+def mark_time(figure: Figure, duration: float, shades: Sequence[Shade], columns: int = 1) -> None:
+    """Let the time axes span the run, and shade what is marked behind all rows of each column."""
     figure.update_xaxes(range=[0.0, duration])
     axes = ["x", *(f"x{column}" for column in range(2, columns + 1))]
-    figure.update_layout(shapes=[_shade(outage, axis) for outage in outages for axis in axes])
+    figure.update_layout(shapes=[_rectangle(shade, axis) for shade in shades for axis in axes])
 
 
-def _shade(outage: tuple[float, float], axis: str) -> dict[str, Any]:
-    begin, end = outage
+def _rectangle(shade: Shade, axis: str) -> dict[str, Any]:
     return {
         "type": "rect",
-        "x0": begin,
-        "x1": end,
+        "x0": shade.begin,
+        "x1": shade.end,
         "xref": axis,
         "y0": 0.0,
         "y1": 1.0,
         "yref": "paper",
-        "fillcolor": OUTAGE,
+        "fillcolor": shade.colour,
         "line": {"width": 0},
         "layer": "below",
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from polyins.evaluation.summary import Document, plain
+from polyins.evaluation.summary import Document, on_wheels, plain
 from polyins.recording import Recording
 from polyins.report.scene import Run, Scene
 
@@ -26,6 +26,8 @@ UNKNOWN = "\N{EM DASH}"
 
 COLUMNS: tuple[tuple[str, int, Callable[[Document], float | None]], ...] = (
     ("outages: rms of max. (m)", 2, lambda run: run["outages"]["horizontal_max_rms_m"]),
+    ("drift rate (%)", 2, lambda run: run["drift"]["rate_percent"] if on_wheels(run) else None),
+    ("end point (%)", 2, lambda run: run["drift"]["end_percent"] if on_wheels(run) else None),
     ("horizontal rms (m)", 3, lambda run: run["reference"]["horizontal_rms_m"]),
     ("horizontal max. (m)", 2, lambda run: run["reference"]["horizontal_max_m"]),
     ("vertical rms (m)", 3, lambda run: run["reference"]["vertical_rms_m"]),
@@ -34,10 +36,10 @@ COLUMNS: tuple[tuple[str, int, Callable[[Document], float | None]], ...] = (
     ("heading rmse (deg)", 3, lambda run: run["reference"]["heading_rmse_deg"]),
     ("NEES position", 2, lambda run: run["consistency"]["nees_position"]),
     ("NIS GNSS", 2, lambda run: run["consistency"]["nis_gnss"]),
-    ("fixes rejected", 0, lambda run: run["gnss"]["rejected"]),
+    ("fixes rejected", 0, lambda run: run["gnss"]["rejected"] if run["gnss"]["fixes"] else None),
     ("time per epoch (µs)", 2, lambda run: run["us_per_epoch"]),
 )
-RATIOS = (("error, single / method", "ratio_to_single"), ("time, method / single", "time_ratio_to_single"))
+RATIOS = (("error, {0} / method", "ratio_to_single"), ("time, method / {0}", "time_ratio_to_single"))
 
 
 def figures_table(scene: Scene, comparison: Document | None) -> Table:
@@ -60,9 +62,10 @@ def facts(scene: Scene) -> list[Cell]:
         ("solution", f"{duration:.1f} s, {first.summary['epochs']:,} epochs at {_number(rate, 1)} Hz"),
         ("time zero", f"{scene.start:.3f} s"),
         ("GNSS", "none" if recording.gnss is None else f"{recording.gnss.time.size:,} fixes"),
-        ("outages", _outages(first.summary["outages"])),
+        *([("outages", _outages(first.summary["outages"]))] if recording.gnss else []),
         ("reference", _reference(recording)),
         ("positions", "geodetic (WGS 84)" if recording.geodetic else "local tangent plane, no Earth rate"),
+        *((f"navigators of {run.name}", ", ".join(run.solution.imu_names)) for run in scene.runs if run.on_wheels),
         *((f"start: {key.replace('_', ' ')}", _value(value)) for key, value in first.solution.start.items()),
     ]
 
@@ -81,7 +84,8 @@ def _figures(run: Run, comparison: Document | None) -> list[Cell]:
     own = [(heading, _number(pick(run.summary), digits)) for heading, digits, pick in COLUMNS]
     if comparison is None:
         return own
-    return own + [(heading, _number(comparison[key].get(run.name), 2)) for heading, key in RATIOS]
+    alone = "wheel-ins" if run.on_wheels else "single"
+    return own + [(heading.format(alone), _number(comparison[key].get(run.name), 2)) for heading, key in RATIOS]
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -91,7 +91,7 @@ def _solutions(scene: Scene) -> list[Any]:
 
 
 def _solution(scene: Scene, run: Run) -> Any:
-    track = _track(scene, run.solution.position)
+    track = _track(scene, scene.at_reference_point(run))
     return _line(track, name=run.label, line={"color": run.colour, "dash": run.dash, "width": 1.8})
 
 

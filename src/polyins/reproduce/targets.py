@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 import importlib
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from polyins.errors import InputError
@@ -12,12 +14,17 @@ from polyins.screen import number, print_table
 
 Document = dict[str, Any]
 
-TARGETS = ("flights", "array", "consistency")
+TARGETS = ("flights", "wid", "array", "consistency")
 """Each is a module of this package with a function `reproduce(quick, progress)`."""
+WITH_REPORTS = ("wid",)
+"""Those whose function also takes `out`, the folder for reports."""
 
 
-def find_target(name: str) -> Callable[[bool, Callable[[float], None]], Document]:
-    """Return the function of a target; raise InputError with the nearest known one otherwise."""
+def find_target(name: str, out: Path) -> Callable[[bool, Callable[[float], None]], Document]:
+    """Return the function of a target, which leaves any reports in `out`.
+
+    Raises InputError with the nearest known target for an unknown one.
+    """
     if name not in TARGETS:
         near = difflib.get_close_matches(name, TARGETS, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(TARGETS)}"
@@ -25,7 +32,7 @@ def find_target(name: str) -> Callable[[bool, Callable[[float], None]], Document
     function: Callable[[bool, Callable[[float], None]], Document] = importlib.import_module(
         f"polyins.reproduce.{name}"
     ).reproduce
-    return function
+    return partial(function, out=out) if name in WITH_REPORTS else function
 
 
 def print_document(document: Document) -> None:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from polyins.io.files import whole, write_bytes
 from polyins.io.table import ATTITUDE_NAMES, GEODETIC_NAMES, LOCAL_NAMES, VELOCITY_NAMES, write_gnss, write_imu
 from polyins.io.yaml_document import write_yaml
-from polyins.recording import FilterOptions, Recording, Reference, StartOptions
-from polyins.rig import DEG, HOUR, MGAL, PPM, Imu, ImuErrors, NoiseGrade
+from polyins.recording import FilterOptions, Recording, Reference, RollingOptions, StartOptions
+from polyins.rig import DEG, HOUR, MGAL, PPM, Imu, ImuErrors, NoiseGrade, Wheel
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,8 @@ def write(recording: Recording, folder: str | Path) -> Path:
     config["start"] = _start(recording.start, recording.geodetic)
     config["outages"] = [list(outage) for outage in recording.outages]
     config["filter"] = _filter(recording.options)
+    if recording.rig.rolling:
+        config["filter"]["rolling"] = _rolling(recording.options.rolling)
     write_bytes(place / CONFIG, write_yaml(config).encode())
     return place / CONFIG
 
@@ -76,7 +78,25 @@ def _imu(imu: Imu) -> dict[str, Any]:
     }
     if imu.initial_std is not None:
         entry["initial_std"] = _errors(imu.initial_std)
+    if imu.wheel is not None:
+        entry["wheel"] = _wheel(imu.wheel)
+    if imu.module:
+        entry["module"] = imu.module
+    if imu.mount_std:
+        entry["mount_std_deg"] = imu.mount_std / DEG
     return entry
+
+
+def _wheel(wheel: Wheel) -> dict[str, Any]:
+    """Return a wheel whose IMU's data are in module axes: x along the axle to the right."""
+    return {
+        "radius_m": wheel.radius,
+        "spin_axis": "x",
+        "lever_arm_m": _in(1.0, wheel.lever_arm),
+        "steering": wheel.steering,
+        "radius_std": wheel.radius_std,
+        "lever_arm_std_m": wheel.lever_arm_std,
+    }
 
 
 def _noise(grade: NoiseGrade) -> dict[str, Any]:
@@ -129,4 +149,18 @@ def _start(start: StartOptions, geodetic: bool) -> dict[str, Any]:
 
 def _filter(options: FilterOptions) -> dict[str, Any]:
     units = {"gnss_snap": "gnss_snap_s", "gravity": "gravity_m_s2"}
-    return {units.get(item.name, item.name): getattr(options, item.name) for item in fields(options)}
+    names = [item.name for item in fields(options) if item.name != "rolling"]
+    return {units.get(name, name): getattr(options, name) for name in names}
+
+
+def _rolling(options: RollingOptions) -> dict[str, Any]:
+    return {
+        "speed_interval_s": options.speed_interval,
+        "speed_window_s": options.speed_window,
+        "predict": options.predict,
+        "wheel_speed_std_m_s": _in(1.0, options.wheel_speed_std),
+        "body_speed_std_m_s": _in(1.0, options.body_speed_std),
+        "constraint_interval_s": options.constraint_interval,
+        "constraint_std_m": options.constraint_std,
+        "standstill": options.standstill,
+    }

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.errors import InputError
 from polyins.recording import GnssStream
 from polyins.simulation import earth
-from polyins.simulation.path import Path
+from polyins.simulation.path import Path, World
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def fixes(
     truth = path.truth(time, antenna)
     std = np.broadcast_to(np.asarray(position_std, dtype=float), (time.size, 3)).copy()
     noise = std * rng.standard_normal(std.shape)
-    stream = GnssStream(time, truth.position + earth.displacement(truth.position, noise), std)
+    stream = GnssStream(time, truth.position + path.world.displacement(truth.position, noise), std)
     if velocity_std is None:
         return stream
     velocity_std = np.broadcast_to(np.asarray(velocity_std, dtype=float), (time.size, 3)).copy()
@@ -43,7 +43,12 @@ def fixes(
 
 
 def with_lies(
-    stream: GnssStream, among: NDArray[np.intp], count: int, size: float, rng: np.random.Generator
+    stream: GnssStream,
+    among: NDArray[np.intp],
+    count: int,
+    size: float,
+    rng: np.random.Generator,
+    world: World = earth,
 ) -> tuple[GnssStream, NDArray[np.intp]]:
     """Return the stream with some fixes displaced in random horizontal directions, and the indices of these.
 
@@ -57,5 +62,5 @@ def with_lies(
     direction = rng.uniform(-np.pi, np.pi, count)
     offset = size * np.stack([np.cos(direction), np.sin(direction), np.zeros(count)], axis=-1)
     position = stream.position.copy()
-    position[chosen] += earth.displacement(position[chosen], offset)
+    position[chosen] += world.displacement(position[chosen], offset)
     return replace(stream, position=position), chosen

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polyins.simulation import earth
 from polyins.simulation.path import Path
 
 Array = NDArray[np.float64]
@@ -70,38 +69,38 @@ def _integrate(path: Path, edges: Array, interval: float) -> tuple[Array, Array,
     """Return the integrals of w, f and the lever-arm matrix between the edges, by Gauss-Legendre quadrature."""
     dtheta, dvel = np.zeros((edges.size - 1, 3)), np.zeros((edges.size - 1, 3))
     # the integral of dw/dt needs no derivative
-    lever = _cross_matrix(np.diff(path.motion(edges).angular_rate, axis=0))
+    lever = cross_matrix(np.diff(path.motion(edges).angular_rate, axis=0))
     for node, weight in zip(*np.polynomial.legendre.leggauss(GAUSS_NODES), strict=True):
-        rate, force, arm = _rates(path, edges[:-1] + interval * (1.0 + node) / 2.0)
+        rate, force, arm = rates(path, edges[:-1] + interval * (1.0 + node) / 2.0)
         dtheta += rate * (weight * interval / 2.0)
         dvel += force * (weight * interval / 2.0)
         lever += arm * (weight * interval / 2.0)
     return dtheta, dvel, lever
 
 
-def _rates(path: Path, time: Array) -> tuple[Array, Array, Array]:
+def rates(path: Path, time: Array) -> tuple[Array, Array, Array]:
     """Return w_ib^b, f^b at the origin, and the lever-arm matrix without its dw/dt, at times."""
     motion = path.motion(time)
     speed, acceleration = path.speed(time), path.speed(time, 1)
     # dv/dt in b is (dv/dt, 0, 0) + w_nb x v; with Coriolis (2 w_ie + w_en) x v the rates add up to w_ib + w_ie
     turning = motion.angular_rate + motion.earth_rate
-    force = -earth.gravity(motion.position)[:, None] * motion.C_nb[:, 2, :]
+    force = -path.world.gravity(motion.position)[:, None] * motion.C_nb[:, 2, :]
     force[:, 0] += acceleration
     force[:, 1] += turning[:, 2] * speed
     force[:, 2] -= turning[:, 1] * speed
-    gradient = np.swapaxes(motion.C_nb, 1, 2) @ earth.gravity_gradient(motion.position) @ motion.C_nb
-    arm = _double_cross_matrix(motion.angular_rate) - _double_cross_matrix(motion.earth_rate) - gradient
+    gradient = np.swapaxes(motion.C_nb, 1, 2) @ path.world.gravity_gradient(motion.position) @ motion.C_nb
+    arm = double_cross_matrix(motion.angular_rate) - double_cross_matrix(motion.earth_rate) - gradient
     return motion.angular_rate, force, arm
 
 
-def _cross_matrix(vector: Array) -> Array:
+def cross_matrix(vector: Array) -> Array:
     """Return [v x], shape (T, 3, 3)."""
     matrix = np.zeros((vector.shape[0], 3, 3))
     matrix[:, 2, 1], matrix[:, 0, 2], matrix[:, 1, 0] = vector.T
     return matrix - np.swapaxes(matrix, 1, 2)
 
 
-def _double_cross_matrix(vector: Array) -> Array:
+def double_cross_matrix(vector: Array) -> Array:
     """Return [v x][v x] = v v' - v'v I, shape (T, 3, 3)."""
     square = np.sum(vector**2, axis=1)[:, None, None]
     return np.asarray(vector[:, :, None] * vector[:, None, :] - square * np.eye(3))

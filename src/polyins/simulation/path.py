@@ -1,4 +1,4 @@
-"""A drivable path on the rotating Earth, smooth enough that its rates and accelerations are exact derivatives.
+"""A drivable path on the rotating Earth or on a plane, smooth enough that its rates are exact derivatives.
 
 The velocity points along the body's x axis, so heading is course and pitch is slope. Speed, yaw rate, pitch and roll
 are piecewise polynomials of degree 7 with three continuous derivatives; heading is the integral of the yaw rate,
@@ -29,6 +29,7 @@ POSITION_STEP = 0.01  # s; the cubic between such nodes is exact to nanometres
 PICARD_STEPS = 4  # each shrinks the error by distance over Earth radius
 PEAK = 35.0 / 16.0  # of the derivative of the smooth step, over its mean
 
+TOP_SPEED = 16.0  # m/s
 LONGITUDINAL_LIMIT = 2.0  # m/s^2
 LATERAL_LIMIT = 2.0  # m/s^2
 TURN_RADIUS = 10.0  # m
@@ -45,6 +46,25 @@ class Curve(Protocol):
         """Return the `nu`-th derivative at the times."""
 
 
+class World(Protocol):
+    """What a path lies on, vectorized over time: the module `earth`, or a `plane.Plane`."""
+
+    def gravity(self, position: Array) -> Array:
+        """Return gravity, m/s^2 downwards, shape (T,)."""
+
+    def gravity_gradient(self, position: Array) -> Array:
+        """Return d(gravity vector)/d(displacement), 1/s^2, shape (T, 3, 3)."""
+
+    def earth_rate(self, position: Array) -> Array:
+        """Return w_ie in n, rad/s, shape (T, 3)."""
+
+    def transport_rate(self, position: Array, velocity: Array) -> Array:
+        """Return w_en in n, rad/s, shape (T, 3)."""
+
+    def displacement(self, position: Array, metres: Array) -> Array:
+        """Return the change of the coordinates for small displacements NED, m, shape (T, 3)."""
+
+
 @dataclass(frozen=True)
 class Truth:
     """The true state of one point of the body."""
@@ -52,7 +72,7 @@ class Truth:
     time: Array
     """s, shape (T,)"""
     position: Array
-    """latitude rad, longitude rad, ellipsoidal height m, shape (T, 3)"""
+    """latitude rad, longitude rad, ellipsoidal height m, or north m, east m, height m, shape (T, 3)"""
     velocity: Array
     """m/s north, east, down, shape (T, 3)"""
     attitude: Array
@@ -69,7 +89,7 @@ class Motion:
     """Position, attitude and rates of the body at some instants."""
 
     position: Array
-    """lat rad, lon rad, h m, shape (T, 3)"""
+    """in the world's coordinates, shape (T, 3)"""
     velocity: Array
     """m/s NED, shape (T, 3)"""
     attitude: Array
@@ -99,7 +119,9 @@ class Path:
     heading: Curve
     """rad, continuous"""
     position: Curve
-    """lat rad, lon rad, h m: (T,) -> (T, 3)"""
+    """in the world's coordinates: (T,) -> (T, 3)"""
+    world: World = earth
+    """what it lies on"""
 
     def truth(self, time: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> Truth:
         """Return the true state at times, shape (T,), of a point given in the array frame, m, shape (3,).
@@ -110,13 +132,13 @@ class Path:
         arm = motion.C_nb @ lever_arm
         swing = (motion.C_nb @ np.cross(motion.angular_rate - motion.earth_rate, lever_arm)[..., None])[..., 0]
         # local level turns by 1.6e-7 rad per metre: first order is exact
-        turn = earth.transport_rate(motion.position, arm)
+        turn = self.world.transport_rate(motion.position, arm)
         attitude = motion.attitude - (euler_jacobian(motion.attitude) @ turn[..., None])[..., 0]
         attitude[:, 2] = wrap(attitude[:, 2])
         velocity = motion.velocity + swing
         return Truth(
             time=np.asarray(time, dtype=float),
-            position=motion.position + earth.displacement(motion.position, arm),
+            position=motion.position + self.world.displacement(motion.position, arm),
             velocity=velocity - np.cross(turn, velocity),
             attitude=attitude,
         )
@@ -127,8 +149,8 @@ class Path:
         C_nb = np.ascontiguousarray(rotation_matrices(quaternions(attitude)))
         position = self.position(time)
         velocity = self.speed(time)[:, None] * C_nb[:, :, 0]
-        earth_rate = earth.earth_rate(position)
-        level_rate = _to_body(C_nb, earth_rate + earth.transport_rate(position, velocity))
+        earth_rate = self.world.earth_rate(position)
+        level_rate = _to_body(C_nb, earth_rate + self.world.transport_rate(position, velocity))
         angular_rate = level_rate + self._body_rate(time, attitude)
         return Motion(position, velocity, attitude, C_nb, _to_body(C_nb, earth_rate), angular_rate)
 
@@ -154,8 +176,9 @@ def path(
     duration: float,
     static: float = 0.0,
     start: ArrayLike = START,
+    world: World = earth,
 ) -> Path:
-    """Return the path that starts at a position (lat rad, lon rad, h m) and moves along its body's x axis."""
+    """Return the path that starts at a position, in the world's coordinates, and moves along its body's x axis."""
     from scipy.interpolate import CubicSpline
 
     time = np.linspace(0.0, duration, int(np.ceil(duration / POSITION_STEP)) + 1)
@@ -164,10 +187,10 @@ def path(
     begin = np.asarray(start, dtype=float)
     position = np.broadcast_to(begin, (time.size, 3))
     for _ in range(PICARD_STEPS):
-        integral = CubicSpline(time, earth.displacement(position, velocity)).antiderivative()
+        integral = CubicSpline(time, world.displacement(position, velocity)).antiderivative()
         integral.c[-1] += begin
         position = integral(time)
-    return Path(duration, static, speed, roll, pitch, heading, integral)
+    return Path(duration, static, speed, roll, pitch, heading, integral, world)
 
 
 def drive(
@@ -176,18 +199,21 @@ def drive(
     static: float = 60.0,
     seed: int | np.random.SeedSequence = 0,
     start: ArrayLike = START,
+    top_speed: float = TOP_SPEED,
+    world: World = earth,
 ) -> Path:
     """Return a drive of a road vehicle: a standing start, then turns, slopes and stops.
 
-    `duration` includes the standing start of length `static`, both in s; `start` is latitude rad, longitude rad,
-    ellipsoidal height m. Another seed gives another drive of the same kind.
+    `duration` includes the standing start of length `static`, both in s; `start` is in the world's coordinates, those
+    of the Earth being latitude rad, longitude rad, ellipsoidal height m; `top_speed` is in m/s. Another seed gives
+    another drive of the same kind.
     """
     rng = np.random.default_rng(seed)
-    knots = _plan(duration, static, rng)
+    knots = _plan(duration, static, top_speed, rng)
     speed, yaw_rate, pitch, roll = (smooth_steps(knots[:, 0], column) for column in knots[:, 1:].T)
     heading = yaw_rate.antiderivative()
     heading.c[-1] += rng.uniform(-np.pi, np.pi)
-    return path(speed, roll, pitch, heading, duration=duration, static=static, start=start)
+    return path(speed, roll, pitch, heading, duration=duration, static=static, start=start, world=world)
 
 
 def smooth_steps(time: Array, value: Array) -> PPoly:
@@ -200,7 +226,7 @@ def smooth_steps(time: Array, value: Array) -> PPoly:
     return PPoly(np.stack([*shape, flat, flat, flat, value[:-1]]), time)
 
 
-def _plan(duration: float, static: float, rng: np.random.Generator) -> Array:
+def _plan(duration: float, static: float, top_speed: float, rng: np.random.Generator) -> Array:
     """Return knots (time, speed, yaw rate, pitch, roll), shape (K, 5), from time 0 beyond the duration.
 
     Speed and yaw rate change by the same smooth step, so between knots the curvature stays within that of the knots.
@@ -211,7 +237,7 @@ def _plan(duration: float, static: float, rng: np.random.Generator) -> Array:
         knots.append(_standing(rest, static))
     while knots[-1][0] <= duration:
         for _ in range(rng.integers(5, 14)):
-            knots.append(_leg(knots[-1], rng.uniform(4.0, 16.0), rng))
+            knots.append(_leg(knots[-1], rng.uniform(0.25, 1.0) * top_speed, rng))
         knots.append(_leg(knots[-1], 0.0, rng))
         knots.append(_standing(knots[-1], rng.uniform(4.0, 15.0)))
     return np.array(knots)

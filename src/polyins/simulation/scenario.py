@@ -1,17 +1,17 @@
-"""A simulated recording from a short description: a drive, an array of IMUs with errors, GNSS with outages and lies."""
+"""A simulated recording from a short description: a path, IMUs with errors, GNSS with outages and lies."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from polyins.config import (
     Noise,
+    NotNegative,
     Number,
     Outages,
     OutageSchedule,
@@ -22,32 +22,27 @@ from polyins.config import (
     Triple,
     validated,
 )
-from polyins.errors import InputError
+from polyins.config.fields import blame
 from polyins.io.checks import axes_matrix
 from polyins.io.imu_stream import noise_grade
-from polyins.io.yaml_document import read_yaml, write_yaml
-from polyins.recording import GnssStream, ImuStream, Recording, Reference, StartOptions
+from polyins.io.yaml_document import read_yaml
+from polyins.recording import FilterOptions, Recording
 from polyins.rig import DEG, Imu, Rig
-from polyins.simulation import gnss
-from polyins.simulation.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors
-from polyins.simulation.increments import Increments, increments
-from polyins.simulation.path import Path, drive
+from polyins.simulation import earth
+from polyins.simulation.imu_errors import Imperfections
+from polyins.simulation.path import START, TOP_SPEED, World
+from polyins.simulation.plane import Plane
+from polyins.simulation.run import Simulation, checked, record, true_run
+from polyins.simulation.wheel_scenario import Track, WheelModule
 
 Array = NDArray[np.float64]
 
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Count = Annotated[int, Field(ge=1, strict=True)]
-NotNegative = Annotated[Number, Field(ge=0.0)]
-
-
-def _geodetic(position: StartPosition) -> StartPosition:
-    if not position.geodetic:
-        raise ValueError("expected latitude_deg and longitude_deg")
-    return position
 
 
 class Board(Section):
-    """The IMUs, row by row on a level board whose centre is the array origin."""
+    """The IMUs on the body, row by row on a level board."""
 
     count: Count = 16
     """how many"""
@@ -55,6 +50,8 @@ class Board(Section):
     """IMUs per row; without it as near to a square as can be"""
     pitch_m: NotNegative = 0.015
     """from one IMU to the next, m"""
+    position_m: Triple = (0.0, 0.0, 0.0)
+    """of the board's centre from the array origin, with wheels the middle of the rear axle: forward, right, down, m"""
     mounts: Annotated[tuple[tuple[Axis, Axis, Axis], ...], Field(min_length=1)] = (("x", "y", "z"),)
     """which sensor axes point forward, right and down, one triple for each IMU in turn"""
 
@@ -62,7 +59,7 @@ class Board(Section):
         """Return where the IMUs sit in the array frame, m, shape (count, 3)."""
         row, column = np.divmod(np.arange(self.count), self.columns or int(np.ceil(np.sqrt(self.count))))
         grid = self.pitch_m * np.column_stack([-row, column, np.zeros(self.count)])
-        return np.asarray(grid - grid.mean(axis=0))
+        return np.asarray(grid - grid.mean(axis=0) + self.position_m)
 
     def rotation(self, index: int) -> Array:
         """Return C_ab of an IMU, shape (3, 3)."""
@@ -122,20 +119,32 @@ class Scenario(Section):
     """of the recording"""
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
     """another seed gives another drive with other errors"""
+    path_seed: Annotated[int, Field(ge=0, strict=True)] | None = None
+    """of the drive and the wheels' slip, where they are to stay while seed draws other errors; without it seed"""
     duration_s: Positive = 1000.0
-    """the standing start included, s"""
+    """the standing start included, s; a track may end before"""
     static_s: NotNegative = 60.0
     """length of the standing start, s"""
-    start: Annotated[StartPosition, AfterValidator(_geodetic)] = StartPosition(
-        latitude_deg=30.5278, longitude_deg=114.3557, height_m=35.0
-    )
-    """where the drive starts"""
+    earth: Literal["turning", "plane"] = "turning"
+    """the WGS 84 Earth, or a local tangent plane that does not turn"""
+    gravity_m_s2: Positive = FilterOptions.gravity
+    """on the plane only, m/s^2"""
+    start: StartPosition | None = None
+    """where the drive starts; without it in Wuhan, or at the plane's origin"""
+    top_speed_m_s: Positive = TOP_SPEED
+    """of the drive, m/s; a robot's is about 2"""
+    track: Track | None = None
+    """a surveyed track instead of a drive"""
     rate_hz: Positive = 200.0
     """of the IMUs"""
     imus: Board = Board()
     """how many and where"""
+    wheels: tuple[WheelModule, ...] = ()
+    """the modules on wheels; with them the drive is over ground that does not twist, so that no wheel skids"""
     noise: Noise = Field(default_factory=lambda: Noise.model_validate("consumer-mems"))
     """how good the IMUs are: a mapping, or just the name of a grade"""
+    filter_noise: Noise | None = None
+    """how good the configuration says they are; without it as good as they are"""
     errors: Errors = Errors()
     """which errors they have"""
     gnss: Fixes | None = Fixes()
@@ -159,13 +168,44 @@ class Scenario(Section):
                 raise ValueError(f"outages: [{begin:g}, {end:g}]; expected [from, to] {inside[9:]}")
         return self
 
+    @model_validator(mode="after")
+    def _start_fits_the_earth(self) -> Self:
+        if self.start is not None and self.start.geodetic != (self.earth == "turning"):
+            wanted = "latitude_deg and longitude_deg" if self.earth == "turning" else "north_m and east_m"
+            raise blame("start", f"expected {wanted} where earth is {self.earth}")
+        return self
+
+    @model_validator(mode="after")
+    def _modules_differ(self) -> Self:
+        names = ["body", *(wheel.name for wheel in self.wheels)]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise blame("wheels", f"two modules are named {name!r}; expected a name of its own for each")
+        return self
+
+    def world(self) -> World:
+        """Return what the path lies on."""
+        return earth if self.earth == "turning" else Plane(self.gravity_m_s2)
+
+    def start_position(self) -> Array:
+        """Return where the path starts, in the world's coordinates, shape (3,)."""
+        place = self.start
+        if place is None:
+            return np.array(START) if self.earth == "turning" else np.zeros(3)
+        if place.geodetic:
+            return np.array([place.latitude_deg, place.longitude_deg, place.height_m], dtype=float) * [DEG, DEG, 1.0]
+        return np.array([place.north_m, place.east_m, place.height_m], dtype=float)
+
     def rig(self) -> Rig:
-        """Return what is mounted where."""
-        grade = noise_grade(self.noise)
+        """Return what is mounted where: the IMUs on the body, then those on the wheels."""
+        grade = noise_grade(self.filter_noise or self.noise)
+        name = "body" if self.wheels else "imu"
+        module = "body" if self.wheels and self.imus.pitch_m == 0.0 else ""
         imus = [
-            Imu(f"imu{index + 1}", grade, self.imus.rotation(index), position)
+            Imu(f"{name}{index + 1}", grade, self.imus.rotation(index), position, module=module)
             for index, position in enumerate(self.imus.positions())
         ]
+        imus += [imu for wheel in self.wheels for imu in wheel.imus(grade)]
         return Rig(tuple(imus), np.array(self.gnss.antenna_position_m if self.gnss else (0.0, 0.0, 0.0)))
 
     def outage_intervals(self) -> tuple[tuple[float, float], ...]:
@@ -183,18 +223,6 @@ class Scenario(Section):
         return tuple((float(begin), float(begin + length)) for begin in begins)
 
 
-@dataclass(frozen=True)
-class Simulation:
-    """A recording and the truth behind it."""
-
-    recording: Recording
-    path: Path
-    errors: tuple[TrueErrors, ...]
-    """in the order of the rig's IMUs"""
-    lies: NDArray[np.intp]
-    """indices of the fixes that are wrong"""
-
-
 def demo() -> Scenario:
     """Return the scenario of the demonstration: 16 IMUs, six minutes, four outages of 30 s."""
     return Scenario(
@@ -207,11 +235,16 @@ def demo() -> Scenario:
 
 
 def read_scenario(path: str | FilePath) -> Scenario:
-    """Read a scenario from a YAML file.
+    """Read a scenario from a YAML file; paths in it count from the file.
 
     Raises InputError that names file, line and key of the first thing wrong.
     """
-    return validated(Scenario, read_yaml(path))
+    scenario = validated(Scenario, read_yaml(path))
+    if scenario.track is None:
+        return scenario
+    folder, track = FilePath(path).parent.resolve(), scenario.track
+    files = {key: str(folder / FilePath(getattr(track, key)).expanduser()) for key in ("file", "odometer")}
+    return scenario.model_copy(update={"track": track.model_copy(update=files)})
 
 
 def simulate(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Recording:
@@ -223,80 +256,10 @@ def simulate(scenario: Scenario | str | FilePath | None = None, *, seed: int | N
 
 
 def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Simulation:
-    """Return the recording of a scenario like `simulate`, with the path and the errors behind it.
-
-    Each IMU draws from a generator of its own: one IMU more changes nothing for the others.
-    """
+    """Return the recording of a scenario like `simulate`, with the path and the errors behind it."""
     if isinstance(scenario, str | FilePath):
         scenario = read_scenario(scenario)
     scenario = scenario or Scenario()
-    if seed is not None and seed < 0:
-        raise InputError(f"seed is {seed}; expected a whole number that is not negative")
     if seed is not None:
-        scenario = scenario.model_copy(update={"seed": seed})
-    drive_seed, gnss_seed, imu_seed = np.random.SeedSequence(scenario.seed).spawn(3)
-    rig, path = scenario.rig(), _drive(scenario, drive_seed)
-    exact = increments(path, scenario.rate_hz)
-    imperfections = scenario.errors.imperfections()
-    sensed = [
-        _sense(imu, exact, imperfections, np.random.default_rng(own_seed))
-        for imu, own_seed in zip(rig.imus, imu_seed.spawn(len(rig.imus)), strict=True)
-    ]
-    too_short = bool(scenario.gnss and scenario.outages) and not scenario.outage_intervals()
-    still = (float(exact.time[0]), scenario.static_s)
-    stream, lies = _receive(scenario, path, np.random.default_rng(gnss_seed))
-    recording = Recording(
-        rig=rig,
-        imus=tuple(stream for stream, _ in sensed),
-        gnss=stream,
-        reference=_reference(path, scenario.reference_rate_hz),
-        outages=scenario.outage_intervals(),
-        start=StartOptions(static_interval=still if still[0] < still[1] else None),
-        name=scenario.name,
-        warnings=("outages: the drive is too short for one",) if too_short else (),
-        config_text=write_yaml(scenario.model_dump(mode="json")),
-    )
-    return Simulation(recording, path, tuple(errors for _, errors in sensed), lies)
-
-
-def _drive(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
-    place = scenario.start
-    start = np.array([place.latitude_deg, place.longitude_deg, place.height_m], dtype=float) * [DEG, DEG, 1.0]
-    return drive(scenario.duration_s, static=scenario.static_s, seed=seed, start=start)
-
-
-def _sense(
-    imu: Imu, exact: Increments, imperfections: Imperfections, rng: np.random.Generator
-) -> tuple[ImuStream, TrueErrors]:
-    """Return what one IMU puts out, turned into array axes as a reader does, and its errors."""
-    dtheta, dvel = exact.at(imu.position, imu.rotation)
-    errors = draw_errors(exact.time[-1], imu.noise, imperfections, rng)
-    white = imperfections.limit(imu.noise)
-    dtheta, dvel = corrupt(exact.time, dtheta, dvel, errors, white, rng)
-    return ImuStream(imu.name, exact.time, dtheta @ imu.rotation.T, dvel @ imu.rotation.T), errors
-
-
-def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[GnssStream | None, NDArray[np.intp]]:
-    """Return the fixes and the indices of the lies among them."""
-    if scenario.gnss is None:
-        return None, np.zeros(0, dtype=np.intp)
-    receiver = scenario.gnss
-    stream = gnss.fixes(
-        path,
-        receiver.antenna_position_m,
-        rng=rng,
-        position_std=receiver.position_std_m,
-        velocity_std=receiver.velocity_std_m_s,
-        rate_hz=receiver.rate_hz,
-        phase=receiver.phase_s,
-    )
-    shown = stream.time > scenario.static_s
-    for begin, end in scenario.outage_intervals():
-        shown &= (stream.time < begin) | (stream.time > end)
-    return gnss.with_lies(stream, np.flatnonzero(shown), receiver.lies.count, receiver.lies.size_m, rng)
-
-
-def _reference(path: Path, rate_hz: float) -> Reference:
-    time = np.arange(1.0, np.floor(path.duration * rate_hz + 1e-6) + 1.0) / rate_hz
-    truth = path.truth(time)
-    return Reference(time, truth.position, truth.velocity, truth.attitude)
+        scenario = scenario.model_copy(update={"seed": checked(seed)})
+    return record(true_run(scenario), seed=scenario.seed)

@@ -1,0 +1,1 @@
+"""What a drive tells of the clocks, the wheels and the mounting of its sensors."""

@@ -1,0 +1,75 @@
+"""A configuration with what was estimated in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from polyins.calibration.drive import ASIDE, Calibration, Estimate
+from polyins.config import Config
+from polyins.io.yaml_document import write_yaml
+from polyins.recording import Offset
+
+Values = dict[str, Any]
+DIGITS = 7
+
+
+def calibrated(values: Values, config: Config, calibration: Calibration, folder: Path | None = None) -> str:
+    """Return `values`, what a configuration says, as YAML with the estimates in the place of what was there.
+
+    `config`: the same, filled in. With `folder` relative file names are put into it, so that the text may stand in
+    another one. Clock offsets that were found take the place of `time_offset: estimate`.
+    """
+    new = deepcopy(values)
+    found = {offset.name: offset for offset in calibration.clock_offsets}
+    for raw, entry in zip(new["imus"], config.imus, strict=True):
+        for estimate in calibration.imus[entry.name]:
+            _put(raw, estimate)
+        _settle(raw, entry.clock_offset_s, found.get(entry.name))
+    (new.get("imu_defaults") or {}).pop("time_offset", None)
+    if config.gnss is not None:
+        _settle(new["gnss"], config.gnss.clock_offset_s, found.get("GNSS"))
+    if folder is not None and "dataset" not in new:
+        for section in (*new["imus"], new.get("gnss"), new.get("reference")):
+            if section:
+                section["file"] = str(folder / Path(section["file"]).expanduser())
+    return _heading(calibration) + write_yaml(new)
+
+
+def _put(raw: Values, estimate: Estimate) -> None:
+    """Write an estimate under its key, making sections as needed."""
+    if estimate.key.startswith(ASIDE):
+        return
+    *sections, key = estimate.key.split(".")
+    for section in sections:
+        raw = raw.setdefault(section, {})
+    raw[key] = _plain(estimate.value)
+
+
+def _plain(value: tuple[float, ...] | str) -> Any:
+    if isinstance(value, str):
+        return value.split(", ") if "," in value else value
+    rounded = [round(number, DIGITS) for number in value]
+    return rounded if len(rounded) > 1 else rounded[0]
+
+
+def _settle(raw: Values, configured: float, found: Offset | None) -> None:
+    if found is not None:
+        raw["clock_offset_s"] = round(configured + found.offset_s, DIGITS)
+        raw.pop("time_offset", None)
+
+
+def _heading(calibration: Calibration) -> str:
+    """Say how sure the estimates are, in comments."""
+    lines = ["# Calibrated from a drive by polyins; standard deviations:"]
+    for name, estimates in calibration.imus.items():
+        parts = [f"{one.key} {_numbers(one.std)}" for one in estimates if one.std and not one.key.startswith(ASIDE)]
+        lines.append(f"#   {name}: " + "; ".join(parts))
+    lines += [f"#   clock of {one.name}: {one.std_s:.4f} s" for one in calibration.clock_offsets]
+    return "\n".join(lines) + "\n"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.2g}" for value in values)

@@ -1,0 +1,313 @@
+"""Offsets between clocks that were never synchronised, from the motion that their sensors share.
+
+Each stream is reduced to a few signals that need no knowledge of its mounting: the three rates of a body, the spin and
+the yaw of a wheel, the distances between GNSS fixes. Two streams on the right offset explain each other linearly. How
+well is the mutual information of Gaussian signals, -1/2 sum ln(1 - rho_i^2) with their canonical correlations rho_i:
+its product with the common time is the gain of log likelihood, which is compared over all offsets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from polyins.calibration.motion import Running, motion
+from polyins.calibration.regression import BLOCKS, blocks, huber, jackknife_covariance
+from polyins.calibration.wheels import spin_axis, turns
+from polyins.errors import InputError
+from polyins.geodesy import displacement
+from polyins.recording import Array, GnssStream, ImuStream, Offset
+from polyins.rig import Imu
+
+WINDOW = 1.0
+"""s: increments over so long are compared; shorter ones show the road, which each sensor feels in its own way"""
+COARSE_STEP = 0.05  # s
+FINE_STEP = 0.1  # s, from one window to the next
+FINE_REACH = 0.1  # s, to both sides
+FINE_TRIALS = 41
+SHORTEST_COMMON = 20.0  # s
+SMALLEST_SHARE = 0.2  # of the shorter stream
+NOISE = 0.01
+"""of the variance, added in the coarse search: on its grid no offset fits better than so, and none wins by rounding"""
+IDLE = 1e-12
+"""of the variance, added in the fine search: a signal that is exactly nought explains nothing and does no harm"""
+RIVAL = 0.7
+"""A second peak with this part of the first one's information makes the offset ambiguous."""
+LOBE = 3.0  # s: nearer than this it is the same peak
+LEAST_CORRELATION = 0.8
+LEAST_TURN = 0.003  # rad, rms over a window: less is no motion
+LEAST_DISTANCE = 0.2  # m
+
+
+class Signals(Protocol):
+    """What two streams are compared by."""
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last instant, s."""
+
+    def between(self, begin: Array, end: Array) -> Array:
+        """Return what happened from `begin` to `end`, shape (M, K)."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """Horizontal positions, compared by the distances between them."""
+
+    time: Array
+    """s, shape (M,)"""
+    position: Array
+    """m north, east, shape (M, 2)"""
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last instant, s."""
+        return float(self.time[0]), float(self.time[-1])
+
+    def between(self, begin: Array, end: Array) -> Array:
+        """Return the distances between two instants, m, shape (M, 1)."""
+        chord = Running(self.time, self.position).between(begin, end)
+        return np.asarray(np.linalg.norm(chord, axis=1)[:, None])
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of several streams on one clock: of the wheels on both sides it is the middle of the axle's."""
+
+    parts: Sequence[Running]
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last instant that all cover, s."""
+        return max(part.span[0] for part in self.parts), min(part.span[1] for part in self.parts)
+
+    def between(self, begin: Array, end: Array) -> Array:
+        """Return the mean increments, shape (M, K)."""
+        return np.asarray(np.mean([part.between(begin, end) for part in self.parts], axis=0))
+
+
+def imu_offsets(imus: Sequence[Imu], streams: Sequence[ImuStream], base: int) -> tuple[Offset, ...]:
+    """Find what to add to the stamps of each IMU to put them on the clock of number `base`.
+
+    Wheels are compared by spin and yaw, a wheel and a body by yaw, bodies by all rates. A steered wheel's yaw is not
+    the body's: it is compared by its spin with another wheel. Raises InputError where streams share no motion, or fit
+    each other at more than one offset.
+    """
+    hub = _hub(imus, base)
+    signals = [_imu_signals(imu, stream) for imu, stream in zip(imus, streams, strict=True)]
+    to_hub = [
+        none(imu.name) if i == hub else find_offset(imu.name, signals[i], imus[hub].name, signals[hub])
+        for i, imu in enumerate(imus)
+    ]
+    onward = reversed_offset(to_hub[base], imus[hub].name)
+    return tuple(none(one.name) if i == base else chained(one, onward) for i, one in enumerate(to_hub))
+
+
+def gnss_offset(
+    imus: Sequence[Imu], streams: Sequence[ImuStream], gnss: GnssStream, geodetic: bool, name: str = "GNSS"
+) -> Offset:
+    """Find what to add to the stamps of GNSS to put them on the clock of the IMUs, which share one.
+
+    The distances between fixes are compared with the spin of the wheels, steered ones only if there are no others.
+    What comes out holds the receiver's latency. Raises InputError without an IMU on a wheel, and as `imu_offsets`.
+    """
+    wheels = [i for i, imu in enumerate(imus) if imu.wheel is not None]
+    straight = [i for i in wheels if not _steered(imus[i])]
+    if not wheels:
+        raise InputError(f"{name}: its clock's offset is found by wheel speed; expected an IMU on a wheel")
+    rolling = Mean([_imu_signals(imus[i], streams[i]) for i in straight or wheels])
+    position = displacement(gnss.position, gnss.position[0], geodetic)
+    path = Path(gnss.time, position[:, :2])
+    return find_offset(name, path, "the wheels", rolling)
+
+
+def find_offset(name: str, signals: Signals, base_name: str, base: Signals) -> Offset:
+    """Find what to add to the stamps of `signals` to put them on the clock of `base`.
+
+    All offsets are searched that leave 20 s, and a fifth of the shorter stream, in common; the best one is refined to
+    a fraction of a sample. Its std is that of estimates which leave out an eighth of the time each. Raises InputError
+    for no common motion and for an ambiguous offset.
+    """
+    pair = f"{name} and {base_name}"
+    coarse = _search(signals, base, pair)
+    for _ in range(3):
+        offset, std, correlation, at_edge = _refine(signals, base, coarse)
+        if not at_edge:
+            break
+        coarse = offset
+    if correlation < LEAST_CORRELATION:
+        raise InputError(
+            f"time_offset: {pair} share no common motion (correlation {correlation:.2f} at best); expected streams of "
+            "one drive"
+        )
+    return Offset(name, offset, std, correlation)
+
+
+def _hub(imus: Sequence[Imu], base: int) -> int:
+    """Return the IMU with which all others are compared: a wheel that is not steered, else a body, else the base."""
+    wheels = [i for i, imu in enumerate(imus) if imu.wheel is not None and not _steered(imu)]
+    bodies = [i for i, imu in enumerate(imus) if imu.wheel is None]
+    candidates = wheels or bodies or [base]
+    return base if base in candidates else candidates[0]
+
+
+def _steered(imu: Imu) -> bool:
+    return imu.wheel is not None and imu.wheel.steering
+
+
+def none(name: str) -> Offset:
+    """Return the offset of a clock from itself."""
+    return Offset(name, 0.0, 0.0, 1.0)
+
+
+def chained(one: Offset, onward: Offset) -> Offset:
+    """Return the offset of `one` to the clock to which `onward` leads from that of its base."""
+    std = float(np.hypot(one.std_s, onward.std_s))
+    return Offset(one.name, one.offset_s + onward.offset_s, std, min(one.correlation, onward.correlation))
+
+
+def reversed_offset(one: Offset, name: str) -> Offset:
+    """Return what to add to the other clock instead, whose stream has that name."""
+    return replace(one, name=name, offset_s=-one.offset_s)
+
+
+def _imu_signals(imu: Imu, stream: ImuStream) -> Running:
+    moved = motion(stream)
+    if imu.wheel is None:
+        return moved.running(moved.rate)
+    spin_and_yaw = turns(moved, spin_axis(moved, imu.name))
+    return Running(spin_and_yaw.edges, spin_and_yaw.sums[:, :1]) if imu.wheel.steering else spin_and_yaw
+
+
+def _windows(signals: Signals, step: float) -> tuple[Array, Array]:
+    """Return the middles of windows every `step` seconds, shape (M,), and what happened in them, shape (M, K)."""
+    begin, end = signals.span
+    middle = np.arange(begin + 0.5 * WINDOW, end - 0.5 * WINDOW, step)
+    return middle, signals.between(middle - 0.5 * WINDOW, middle + 0.5 * WINDOW)
+
+
+def _search(signals: Signals, base: Signals, pair: str) -> float:
+    """Return the offset with the most information, to a step of the grid; raise InputError if there are rivals."""
+    time, one = _windows(signals, COARSE_STEP)
+    base_time, two = _windows(base, COARSE_STEP)
+    least = SHORTEST_COMMON + SMALLEST_SHARE * (min(len(one), len(two)) * COARSE_STEP - SHORTEST_COMMON)
+    if min(len(one), len(two)) * COARSE_STEP < SHORTEST_COMMON:
+        raise InputError(f"time_offset: {pair}: one has less than {SHORTEST_COMMON:g} s of data; expected more")
+    for windows, source in ((one, signals), (two, base)):
+        limit = LEAST_DISTANCE if isinstance(source, Path) else LEAST_TURN
+        if np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=0)).max() < limit:
+            raise InputError(f"time_offset: {pair} share no common motion: one hardly moves; expected a drive")
+    lags, gain = _gains(one, two, least / COARSE_STEP)
+    best = int(np.argmax(gain))
+    peaks = np.flatnonzero((gain[1:-1] >= gain[:-2]) & (gain[1:-1] > gain[2:])) + 1
+    rivals = peaks[np.abs(lags[peaks] - lags[best]) * COARSE_STEP > LOBE]
+    offset = base_time[0] - time[0] + lags * COARSE_STEP
+    if len(rivals) and gain[rivals].max() > RIVAL * gain[best]:
+        other = offset[rivals[np.argmax(gain[rivals])]]
+        raise InputError(
+            f"time_offset: ambiguous offset of {pair}: {offset[best]:.2f} s and {other:.2f} s fit almost equally well; "
+            "expected a drive whose speed or turns do not repeat, or none in common"
+        )
+    return float(offset[best])
+
+
+def _gains(one: Array, two: Array, least: float) -> tuple[Array, Array]:
+    """Return lags, in rows, and the gain of log likelihood at each; row i of `one` meets row i + lag of `two`.
+
+    Means and covariances are those of the rows in common, by FFT; at least `least` of them.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    size = next_fast_len(len(one) + len(two), real=True)
+    a, b = _standard(one), _standard(two)
+    count_a, count_b = np.ones((len(a), 1)), np.ones((len(b), 1))
+
+    def sums(x: Array, y: Array) -> Array:
+        """Sum x[i] y[i + lag] over i, shape (size, columns of x, columns of y)."""
+        spectrum = np.conj(rfft(x, size, axis=0))[:, :, None] * rfft(y, size, axis=0)[:, None, :]
+        return np.asarray(irfft(spectrum, size, axis=0))
+
+    lags = np.arange(size)
+    lags[lags >= len(b)] -= size
+    order = np.argsort(lags)
+    common = np.rint(sums(count_a, count_b)[:, 0, 0])
+    kept = order[common[order] >= least]
+    n = common[kept, None, None]
+    mean_a, mean_b = sums(a, count_b)[kept] / n, sums(count_a, b)[kept] / n
+    aa = sums(_products(a), count_b)[kept].reshape(-1, a.shape[1], a.shape[1]) / n - mean_a @ mean_a.mT
+    bb = sums(count_a, _products(b))[kept].reshape(-1, b.shape[1], b.shape[1]) / n - mean_b.mT @ mean_b
+    ab = sums(a, b)[kept] / n - mean_a @ mean_b
+    return lags[kept], common[kept] * _information(aa, bb, ab, NOISE)
+
+
+def _standard(values: Array) -> Array:
+    """Return the columns less their means, over their standard deviations."""
+    centred = values - values.mean(axis=0)
+    return np.asarray(centred / (centred.std(axis=0) + np.finfo(float).tiny))
+
+
+def _products(values: Array) -> Array:
+    return np.asarray(np.einsum("ti,tj->tij", values, values).reshape(len(values), -1))
+
+
+def _information(aa: Array, bb: Array, ab: Array, noise: float) -> Array:
+    """Return the mutual information of Gaussian signals from their covariances, shapes (..., K, K) to (..., K, L).
+
+    `noise` is added to the variances, which are about one.
+    """
+    aa, bb = aa + noise * np.eye(aa.shape[-1]), bb + noise * np.eye(bb.shape[-1])
+    left = np.eye(aa.shape[-1]) - np.linalg.solve(aa, ab) @ np.linalg.solve(bb, ab.mT)
+    return np.asarray(-0.5 * np.log(np.maximum(np.linalg.det(left), np.finfo(float).tiny)))
+
+
+def _refine(signals: Signals, base: Signals, coarse: float) -> tuple[float, float, float, bool]:
+    """Return the offset with the most information near `coarse`, its std, the correlation, and if it lies at an edge.
+
+    Windows that do not fit count less (Huber).
+    """
+    begin, end = signals.span
+    first, last = base.span
+    reach = 0.5 * WINDOW + FINE_REACH + COARSE_STEP
+    middle = np.arange(max(begin, first - coarse) + reach, min(end, last - coarse) - reach, FINE_STEP)
+    windows = (middle - 0.5 * WINDOW, middle + 0.5 * WINDOW)
+    one = _standard(signals.between(*windows))
+    weights = _weights(one, base.between(windows[0] + coarse, windows[1] + coarse))
+    trials = coarse + np.linspace(-FINE_REACH, FINE_REACH, FINE_TRIALS)
+    gains = np.array([_left_out(one, _standard(base.between(*(w + t for w in windows))), weights) for t in trials])
+    peaks = np.array([_peak(trials, gain) for gain in gains.T])
+    correlation = float(np.sqrt(-np.expm1(-2.0 * gains[:, 0].max())))
+    std = float(np.sqrt(jackknife_covariance(peaks[1:, None])[0, 0]))
+    return float(peaks[0]), std, correlation, bool(abs(peaks[0] - coarse) > 0.9 * FINE_REACH)
+
+
+def _weights(one: Array, two: Array) -> Array:
+    """Return Huber's weights of the windows from what `two` leaves unexplained of `one`, shape (M,)."""
+    design = np.column_stack([two, np.ones(len(two))])
+    residuals = one - design @ np.linalg.lstsq(design, one, rcond=None)[0]
+    return np.asarray(np.prod([huber(column) for column in residuals.T], axis=0))
+
+
+def _left_out(one: Array, two: Array, weights: Array) -> Array:
+    """Return the mutual information over all windows, then over those without each block, shape (1 + BLOCKS,)."""
+    both = np.column_stack([np.ones(len(one)), one, two])
+    block = blocks(len(one))
+    moments = np.array([(both[block == b].T * weights[block == b]) @ both[block == b] for b in range(BLOCKS)])
+    whole = moments.sum(axis=0)
+    used = np.concatenate([whole[None], whole - moments])
+    means = used / used[:, :1, :1]
+    covariance = means[:, 1:, 1:] - means[:, 1:, :1] @ means[:, :1, 1:]
+    k = one.shape[1]
+    return _information(covariance[:, :k, :k], covariance[:, k:, k:], covariance[:, :k, k:], IDLE)
+
+
+def _peak(at: Array, values: Array) -> float:
+    """Return where the parabola through the values about the largest one has its top."""
+    best = int(np.clip(np.argmax(values), 3, len(values) - 4))
+    near = slice(best - 3, best + 4)
+    square, slope, _ = np.polyfit(at[near] - at[best], values[near], 2)
+    if square >= 0.0:
+        return float(at[np.argmax(values)])
+    return float(at[best] + np.clip(-0.5 * slope / square, at[0] - at[best], at[-1] - at[best]))

@@ -1,0 +1,92 @@
+"""The heading at the start of a vehicle with wheels: how its dead-reckoned track must be turned to lie on GNSS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.geodesy import displacement
+from polyins.recording import GnssStream, Recording
+from polyins.rig import DEG
+from polyins.solution import Solution
+
+Array = NDArray[np.float64]
+
+LENGTH = 50.0
+"""m of track that are compared; farther on dead reckoning bends"""
+SHORTEST = 5.0
+LEAST_STD = 0.1 * DEG
+
+
+@dataclass(frozen=True)
+class Course:
+    """A heading and where it came from."""
+
+    heading: float
+    """rad"""
+    std: float
+    """rad"""
+    source: str
+
+
+def is_wanted(recording: Recording) -> bool:
+    """Whether the heading of a recording is to come from GNSS."""
+    start = recording.start
+    return recording.gnss is not None and (
+        start.heading_from == "gnss-course" or (start.heading_from == "auto" and start.heading is None)
+    )
+
+
+def find(recording: Recording, navigate: Callable[[Recording], Solution]) -> Course:
+    """Dead-reckon with heading zero by `navigate` and fit the track to GNSS; raise InputError if it is too short.
+
+    The rotation is the one of least squares in the horizontal plane, robust against single wrong fixes.
+    """
+    gnss = recording.gnss
+    assert gnss is not None
+    origin = gnss.position[0] if recording.start.position is None else recording.start.position
+    blind = replace(recording.start, heading=0.0, heading_from="value", position=origin)
+    solution = navigate(replace(recording, gnss=None, outages=(), start=blind))
+    track, fixes = _pairs(recording, gnss, solution)
+    reach = float(np.max(np.linalg.norm(track, axis=1), initial=0.0))
+    if reach < SHORTEST:
+        raise InputError(
+            f"start: no heading: the vehicle goes {reach:.1f} m while there is GNSS;"
+            f" expected {SHORTEST:g} m or start.heading_deg"
+        )
+    kept = np.ones(len(track), dtype=bool)
+    for _ in range(3):
+        angle, residual = _rotation(track, fixes, kept)
+        kept = residual <= 3.0 * np.median(residual) + 1e-6
+    spread = np.sqrt(np.sum((track[kept] - track[kept].mean(axis=0)) ** 2))
+    std = max(LEAST_STD, float(np.sqrt(np.mean(residual[kept] ** 2)) / spread * np.sqrt(2.0)))
+    return Course(angle, std, f"dead-reckoned track turned onto GNSS over {reach:.0f} m")
+
+
+def _pairs(recording: Recording, gnss: GnssStream, solution: Solution) -> tuple[Array, Array]:
+    """Return the antenna as dead-reckoned and as fixed at the fixes of the first stretch, m north and east."""
+    from scipy.spatial.transform import Rotation
+
+    antenna = Rotation.from_quat(solution.attitude, scalar_first=True).apply(recording.rig.antenna)
+    way = displacement(solution.position, solution.position[0], recording.geodetic) + antenna
+    far = np.flatnonzero(np.linalg.norm(way[:, :2], axis=1) > LENGTH)
+    end = solution.time[far[0]] if len(far) else solution.time[-1]
+    shown = (gnss.time >= solution.time[0]) & (gnss.time <= end)
+    fixes = displacement(gnss.position[shown], gnss.position[0], recording.geodetic)[:, :2]
+    track = np.column_stack([np.interp(gnss.time[shown], solution.time, way[:, k]) for k in range(2)])
+    return track, fixes
+
+
+def _rotation(track: Array, fixes: Array, kept: NDArray[np.bool_]) -> tuple[float, Array]:
+    """Return the angle that turns the track onto the fixes, rad, and how far each then is from it, m."""
+    a, b = track - track[kept].mean(axis=0), fixes - fixes[kept].mean(axis=0)
+    cosine = float(np.sum(a[kept] * b[kept]))
+    sine = float(np.sum(a[kept, 0] * b[kept, 1] - a[kept, 1] * b[kept, 0]))
+    angle = float(np.arctan2(sine, cosine))
+    c, s = np.cos(angle), np.sin(angle)
+    turned = np.column_stack([c * a[:, 0] - s * a[:, 1], s * a[:, 0] + c * a[:, 1]])
+    return angle, np.linalg.norm(turned - b, axis=1)

@@ -1,0 +1,67 @@
+"""How far vehicles drift per distance travelled, as in paper B's Fig. 10."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polyins.evaluation.drift import drift_curve, drift_rates
+from polyins.report.decimation import kept_for_display, points_per_trace
+from polyins.report.scene import Run, Scene
+from polyins.report.style import finish
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+DRAWN_FROM = 0.05
+"""share of the way: before it, any error is a large part of the distance"""
+
+
+def drift_figure(scene: Scene) -> Figure | None:
+    """Draw the curves, percent over m, with marks where the rate is taken; None without wheels or reference."""
+    from plotly.graph_objects import Figure
+
+    runs = [run for run in scene.runs if run.on_wheels and run.errors is not None and run.errors.time.size]
+    if not runs:
+        return None
+    figure = Figure([trace for run in runs for trace in _traces(run, points_per_trace(len(runs)))])
+    finish(figure, height=440)
+    figure.update_xaxes(title_text="distance travelled (m)")
+    figure.update_yaxes(title_text="drift rate (%)", rangemode="tozero")
+    return figure
+
+
+def _traces(run: Run, points: int) -> Iterator[Any]:
+    from plotly.graph_objects import Scatter
+
+    assert run.errors is not None
+    distance, rate = run.errors.distance, drift_curve(run.errors)
+    known = np.flatnonzero((distance > DRAWN_FROM * distance[-1]) & np.isfinite(rate))
+    drawn = known[kept_for_display(rate[known, None], points)]
+    yield Scatter(
+        x=distance[drawn].astype(np.float32),
+        y=rate[drawn].astype(np.float32),
+        name=_label(run),
+        legendgroup=run.label,
+        mode="lines",
+        line={"color": run.colour, "dash": run.dash, "width": 1.8},
+        hovertemplate="%{y:.3f} % after %{x:.0f} m",
+    )
+    multiples, rates = drift_rates(run.errors, run.summary["drift"]["step_m"])
+    yield Scatter(
+        x=multiples,
+        y=rates,
+        name=run.label,
+        legendgroup=run.label,
+        showlegend=False,
+        mode="markers",
+        marker={"color": run.colour, "size": 6},
+        hovertemplate="%{y:.3f} % after %{x:.0f} m",
+    )
+
+
+def _label(run: Run) -> str:
+    rate = run.summary["drift"]["rate_percent"]
+    return run.label if rate is None else f"{run.label} (mean {rate:.2f} %)"

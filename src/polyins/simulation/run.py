@@ -1,0 +1,213 @@
+"""The truth of a scenario, and recordings of it: errors, noise and fixes are drawn apart from the truth.
+
+Many recordings of one run are cheap: what error-free IMUs put out is worked out once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.io.imu_stream import noise_grade
+from polyins.io.yaml_document import write_yaml
+from polyins.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
+from polyins.rig import DEG, Imu
+from polyins.simulation import gnss
+from polyins.simulation.ground import without_twist
+from polyins.simulation.imu_errors import TrueErrors, corrupt, draw_errors
+from polyins.simulation.increments import Increments, increments
+from polyins.simulation.path import Path, drive
+from polyins.simulation.rolling import RollingWheel
+from polyins.simulation.wheels import wheel_increments
+
+if TYPE_CHECKING:
+    from polyins.simulation.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+START_STD = (0.05, 0.05, np.array([1.0, 1.0, 0.1]) * DEG)
+"""m, m/s and rad (roll, pitch, heading): how sure a start that the truth gives claims to be"""
+
+
+@dataclass(frozen=True)
+class TrueRun:
+    """The truth of a scenario: everything that does not depend on errors."""
+
+    scenario: Scenario
+    """its seeds and its duration are those of the path"""
+    path: Path
+    body: Increments
+    """error-free, of the body"""
+    wheels: tuple[RollingWheel, ...]
+    """in the order of the scenario's"""
+    spinning: tuple[Increments, ...]
+    """error-free, of the modules on the wheels"""
+
+    def sensed(self, imu: Imu) -> tuple[Array, Array]:
+        """Return the error-free (dtheta, dvel) of an IMU in its own axes, shape (T, 3) each."""
+        if imu.wheel is None:
+            return self.body.at(imu.position, imu.rotation)
+        names = [wheel.name for wheel in self.scenario.wheels]
+        return self.spinning[names.index(imu.module)].at(-imu.wheel.lever_arm)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A recording and the truth behind it."""
+
+    recording: Recording
+    path: Path
+    errors: tuple[TrueErrors, ...]
+    """in the order of the rig's IMUs"""
+    lies: NDArray[np.intp]
+    """indices of the fixes that are wrong"""
+    wheels: tuple[RollingWheel, ...] = ()
+    """in the order of the scenario's"""
+
+
+def true_run(scenario: Scenario) -> TrueRun:
+    """Return the truth of a scenario: its path, its wheels, and what error-free IMUs put out.
+
+    Raises InputError for a scenario that cannot be.
+    """
+    seed = scenario.seed if scenario.path_seed is None else scenario.path_seed
+    drive_seed, _, _, wheel_seed = np.random.SeedSequence(seed).spawn(4)
+    path = _path(scenario, drive_seed)
+    wheels = tuple(
+        wheel.rolls(path, np.random.default_rng(own_seed))
+        for wheel, own_seed in zip(scenario.wheels, wheel_seed.spawn(len(scenario.wheels)), strict=True)
+    )
+    return TrueRun(
+        scenario.model_copy(update={"path_seed": seed, "duration_s": path.duration}),
+        path,
+        increments(path, scenario.rate_hz),
+        wheels,
+        tuple(wheel_increments(wheel, scenario.rate_hz) for wheel in wheels),
+    )
+
+
+def record(run: TrueRun, *, seed: int) -> Simulation:
+    """Return a recording of a true run, with errors, noise and fixes that the seed draws.
+
+    Each IMU draws from a generator of its own: one IMU more changes nothing for those before it.
+    """
+    own_path = run.scenario.path_seed if run.scenario.path_seed != seed else None
+    scenario = run.scenario.model_copy(update={"seed": checked(seed), "path_seed": own_path})
+    _, gnss_seed, imu_seed, _ = np.random.SeedSequence(seed).spawn(4)
+    rig = scenario.rig()
+    sensed = [
+        _sense(imu, run, np.random.default_rng(own_seed))
+        for imu, own_seed in zip(rig.imus, imu_seed.spawn(len(rig.imus)), strict=True)
+    ]
+    imus, streams, errors = zip(*sensed, strict=True)
+    too_short = bool(scenario.gnss and scenario.outages) and not scenario.outage_intervals()
+    fixes, lies = _receive(scenario, run.path, np.random.default_rng(gnss_seed))
+    recording = Recording(
+        rig=replace(rig, imus=imus),
+        imus=streams,
+        gnss=fixes,
+        reference=_reference(run.path, scenario.reference_rate_hz),
+        geodetic=scenario.earth == "turning",
+        outages=scenario.outage_intervals(),
+        start=_start(scenario, run),
+        options=FilterOptions(gravity=scenario.gravity_m_s2),
+        name=scenario.name,
+        warnings=("outages: the drive is too short for one",) if too_short else (),
+        config_text=write_yaml(scenario.model_dump(mode="json")),
+    )
+    return Simulation(recording, run.path, errors, lies, run.wheels)
+
+
+def checked(seed: int) -> int:
+    """Return the seed; raise InputError for one that is negative."""
+    if seed < 0:
+        raise InputError(f"seed is {seed}; expected a whole number that is not negative")
+    return seed
+
+
+def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
+    start, world = scenario.start_position(), scenario.world()
+    if scenario.track:
+        path = scenario.track.path(scenario.static_s, start, world)
+        return replace(path, duration=min(path.duration, scenario.duration_s))
+    path = drive(
+        scenario.duration_s,
+        static=scenario.static_s,
+        seed=seed,
+        start=start,
+        top_speed=scenario.top_speed_m_s,
+        world=world,
+    )
+    return without_twist(path) if scenario.wheels else path
+
+
+def _sense(imu: Imu, run: TrueRun, rng: np.random.Generator) -> tuple[Imu, ImuStream, TrueErrors]:
+    """Return an IMU as it is configured, what it puts out, turned into array axes as a reader does, and its errors."""
+    scenario, time = run.scenario, run.body.time
+    imperfections, grade = scenario.errors.imperfections(), noise_grade(scenario.noise)
+    dtheta, dvel = run.sensed(imu)
+    errors = draw_errors(time[-1], grade, imperfections, rng)
+    dtheta, dvel = corrupt(time, dtheta, dvel, errors, imperfections.limit(grade), rng)
+    stream = ImuStream(imu.name, time, dtheta @ imu.rotation.T, dvel @ imu.rotation.T)
+    return _calibrated(imu, scenario, errors), stream, errors
+
+
+def _calibrated(imu: Imu, scenario: Scenario, errors: TrueErrors) -> Imu:
+    """Return an IMU whose wheel, if it has one and it is calibrated, has the radius that its gyro shows."""
+    known = {wheel.name for wheel in scenario.wheels if wheel.calibrated}
+    if imu.wheel is None or imu.module not in known:
+        return imu
+    scale = float(errors.start(imu.rotation).gyro_scale[0])
+    return replace(imu, wheel=replace(imu.wheel, radius=imu.wheel.radius / (1.0 + scale)))
+
+
+def _start(scenario: Scenario, run: TrueRun) -> StartOptions:
+    """Return what is known of the start: when it stands, and with nothing but wheels to go by where and how.
+
+    Paper B's lab starts from its reference, and from these standard deviations.
+    """
+    still = (float(run.body.time[0]), scenario.static_s)
+    interval = still if still[0] < still[1] else None
+    if not scenario.wheels or scenario.gnss:
+        return StartOptions(static_interval=interval)
+    truth = run.path.truth([scenario.static_s])
+    position_std, velocity_std, attitude_std = START_STD
+    return StartOptions(
+        static_interval=interval,
+        position=truth.position[0],
+        heading=float(truth.attitude[0, 2]),
+        heading_from="value",
+        position_std=np.full(3, position_std),
+        velocity_std=np.full(3, velocity_std),
+        attitude_std=attitude_std,
+    )
+
+
+def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[GnssStream | None, NDArray[np.intp]]:
+    """Return the fixes and the indices of the lies among them."""
+    if scenario.gnss is None:
+        return None, np.zeros(0, dtype=np.intp)
+    receiver = scenario.gnss
+    stream = gnss.fixes(
+        path,
+        receiver.antenna_position_m,
+        rng=rng,
+        position_std=receiver.position_std_m,
+        velocity_std=receiver.velocity_std_m_s,
+        rate_hz=receiver.rate_hz,
+        phase=receiver.phase_s,
+    )
+    shown = stream.time > scenario.static_s
+    for begin, end in scenario.outage_intervals():
+        shown &= (stream.time < begin) | (stream.time > end)
+    return gnss.with_lies(stream, np.flatnonzero(shown), receiver.lies.count, receiver.lies.size_m, rng, path.world)
+
+
+def _reference(path: Path, rate_hz: float) -> Reference:
+    time = np.arange(1.0, np.floor(path.duration * rate_hz + 1e-6) + 1.0) / rate_hz
+    truth = path.truth(time)
+    return Reference(time, truth.position, truth.velocity, truth.attitude)

@@ -1,0 +1,118 @@
+"""What a scenario may say of wheels, and of a surveyed track to roll along."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import AfterValidator, Field
+
+from polyins.config import NotNegative, Number, Positive, Section, Triple
+from polyins.io.columns import column_names, read_columns
+from polyins.rig import DEG, Imu, NoiseGrade, Wheel
+from polyins.simulation import earth
+from polyins.simulation.path import Path, World
+from polyins.simulation.rolling import RollingWheel, roll
+from polyins.simulation.slip import slip_periods
+from polyins.simulation.track import track_path
+
+Array = NDArray[np.float64]
+
+Share = Annotated[Number, Field(gt=-1.0, le=10.0)]
+
+
+def _file_name(name: str) -> str:
+    if not re.fullmatch(r"\w[\w .+-]*", name):
+        raise ValueError("expected letters, digits, blanks, and . _ + -")
+    return name
+
+
+class Slip(Section):
+    """By which share a wheel turns more than it rolls."""
+
+    constant: Share = 0.0
+    """all the time; below zero it turns less"""
+    size: Annotated[Number, Field(ge=0.0, le=10.0)] = 0.0
+    """at most this much more in periods of slip, drawn evenly"""
+    length_s: Positive = 1.0
+    """of a period of slip, s"""
+    every_s: Positive = 30.0
+    """mean time from the end of one to the next, s"""
+
+
+class WheelModule(Section):
+    """A board of IMUs in a wheel. Its axes: x along the axle to the right, y and z in the wheel."""
+
+    name: Annotated[str, AfterValidator(_file_name)]
+    """of the module; its IMUs are named name1, name2, ..."""
+    position_m: Triple
+    """of the wheel's centre from the middle of the rear axle: forward, right, down, m"""
+    radius_m: Positive = 0.35
+    """rolling, m"""
+    chips: Annotated[int, Field(ge=1, strict=True)] = 4
+    """how many IMUs, all at one place"""
+    lever_arm_m: Triple = (0.0, 0.015, 0.0)
+    """from them to the wheel's centre, in the module's axes, m"""
+    calibrated: bool = True
+    """the configuration gives each IMU the radius that fits its gyro's scale factor at the start"""
+    slip: Slip = Slip()
+    """of the wheel"""
+
+    def imus(self, grade: NoiseGrade) -> list[Imu]:
+        """Return the module's IMUs."""
+        wheel = Wheel(self.radius_m, np.array(self.lever_arm_m))
+        return [
+            Imu(f"{self.name}{number}", grade, position=np.array(self.position_m), wheel=wheel, module=self.name)
+            for number in range(1, self.chips + 1)
+        ]
+
+    def rolls(self, path: Path, rng: np.random.Generator) -> RollingWheel:
+        """Return the wheel as it rolls along a path, from an angle that is drawn and with its slip."""
+        phase, slip = rng.uniform(-np.pi, np.pi), self.slip
+        if not (slip.constant or slip.size):
+            return roll(path, self.position_m, self.radius_m, phase=phase)
+        share = slip_periods(
+            path.duration, rng, constant=slip.constant, size=slip.size, length=slip.length_s, every=slip.every_s
+        )
+        return roll(path, self.position_m, self.radius_m, phase=phase, slip=share)
+
+
+class Track(Section):
+    """A surveyed track and the speeds at which it is travelled; the ground is level."""
+
+    file: str
+    """a table of points in their order: latitude_deg, longitude_deg, or north_m, east_m"""
+    odometer: str
+    """a table of speeds: time_s, speed_m_s"""
+    smoothing_m: NotNegative = 0.7
+    """bends much shorter than this are smoothed away, m"""
+    rest_s: NotNegative = 5.0
+    """standing at the end, s"""
+
+    def path(self, static: float, start: ArrayLike, world: World) -> Path:
+        """Return the path along the track; raises InputError for files that give none."""
+        north, east = self._points()
+        _, (time, speed) = read_columns(self.odometer, ("time_s", "speed_m_s"))
+        return track_path(
+            north,
+            east,
+            time,
+            speed,
+            static=static,
+            rest=self.rest_s,
+            smoothing=self.smoothing_m,
+            start=start,
+            world=world,
+        )
+
+    def _points(self) -> tuple[Array, Array]:
+        """Return the points north and east of the first one, m."""
+        if "north_m" in column_names(self.file):
+            _, (north, east) = read_columns(self.file, ("north_m", "east_m"))
+            return north - north[0], east - east[0]
+        _, (latitude, longitude) = read_columns(self.file, ("latitude_deg", "longitude_deg"))
+        meridian, transverse = earth.radii(np.array([[latitude[0] * DEG, 0.0, 0.0]]))
+        east = (longitude - longitude[0]) * DEG * transverse * np.cos(latitude[0] * DEG)
+        return (latitude - latitude[0]) * DEG * meridian, east

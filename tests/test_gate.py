@@ -1,0 +1,65 @@
+"""The gate through outages: chips with errors that the filter does not model, and fixes that lie."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from polyins import batch
+from polyins.geodesy import metres_per_unit
+from polyins.recording import Recording
+from polyins.reproduce.array import GNSS
+from polyins.simulation.scenario import Board, Errors, Scenario, simulate
+from polyins.solution import Innovations
+
+CHIPS = Scenario(
+    duration_s=400.0,
+    rate_hz=100.0,
+    imus=Board(count=4),
+    gnss=GNSS,
+    errors=Errors(misalignment_deg=0.2, turn_on_share=0.5),
+)
+"""Outages of 30 s every 90 s; one fix per second."""
+
+
+def innovations(recording: Recording, method: str = "single", imu: int = 0) -> Innovations:
+    return batch.run(recording, method, imu=imu).innovations
+
+
+def lying(recording: Recording, times: NDArray[np.float64], metres_east: float) -> Recording:
+    assert recording.gnss is not None
+    position = recording.gnss.position.copy()
+    position[np.isin(recording.gnss.time, times), 1] += metres_east / metres_per_unit(position[0], True)[1]
+    return replace(recording, gnss=replace(recording.gnss, position=position))
+
+
+def test_misaligned_chips_reject_no_good_fix() -> None:
+    """After outages and in bends, errors beyond the model put good fixes beyond ten of the filter's own sigma."""
+    beyond = 0
+    for seed in range(6):
+        recording = simulate(CHIPS, seed=seed)
+        assert recording.options.gate_limit is not None
+        runs = [innovations(recording, imu=i) for i in range(4)]
+        runs += [innovations(recording, method) for method in ("imu-fusion", "nav-fusion", "enav-fusion")]
+        for run in runs:
+            assert run.accepted.all()
+            assert not run.reopened.any()
+        beyond += sum(np.count_nonzero(run.nis > recording.options.gate_limit) for run in runs)
+    assert beyond > 3
+
+
+@pytest.mark.parametrize("method", ["single", "imu-fusion", "nav-fusion", "enav-fusion"])
+def test_misaligned_chips_still_tell_a_lie(method: str) -> None:
+    """A metre and a half while fixes come, hundreds of metres at the end of an outage."""
+    recording = simulate(CHIPS, seed=1)
+    good = innovations(recording, method)
+    ends = good.time[1:][np.diff(good.time) > 30.0]
+    assert len(ends) == 3
+    between = good.time[np.searchsorted(good.time, ends) + 20]
+    for times, metres in ((ends, 300.0), (between, 1.5)):
+        run = innovations(lying(recording, times, metres), method)
+        np.testing.assert_array_equal(run.time[~run.accepted], times)
+        assert not run.reopened.any()
