@@ -25,17 +25,24 @@ CASES = (
     ("nav-fusion/16", "nav-fusion", 16, False),
     ("dense/enav-fusion/16", "enav-fusion", 16, True),
     ("dense/nav-fusion/16", "nav-fusion", 16, True),
+    ("wheel-ins", "wheel-ins", 0, False),
+    ("triple-ins", "triple-ins", 0, False),
+    ("triple-ins/centralized", "triple-ins/centralized", 0, False),
+    ("dense/triple-ins", "triple-ins", 0, True),
+    ("dense/triple-ins/centralized", "triple-ins/centralized", 0, True),
 )
-"""name, method, IMUs, dense covariance"""
+"""name, method, IMUs of the array or 0 for a vehicle with wheels, dense covariance"""
 
 
 def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
-    """Return the `bench` document: CPU time per epoch (200 Hz IMU, 1 Hz GNSS), compilation left out.
+    """Return the `bench` document: CPU time per epoch, compilation left out.
+
+    IMUs at 200 Hz; arrays with GNSS at 1 Hz, vehicles without, with wheel speed at 2 Hz and the reference point at 1 Hz.
 
     The cases take turns, and each ratio is the median of those within a round, so that a change in the machine's
     speed does not enter.
     """
-    recordings = {count: array(count) for count in sorted({case[2] for case in CASES})}
+    recordings = {count: array(count) if count else vehicle() for count in sorted({case[2] for case in CASES})}
     cost = np.empty((ROUNDS, len(CASES)))
     for k in range(-1, ROUNDS):  # a first round warms up
         for j, (_, method, count, dense) in enumerate(CASES):
@@ -73,6 +80,19 @@ def array(count: int) -> Recording:
     order = [i % len(recording.imus) for i in range(count)]
     imus = tuple(replace(recording.rig.imus[i], name=f"imu{k}") for k, i in enumerate(order, 1))
     return replace(recording, rig=replace(recording.rig, imus=imus), imus=tuple(recording.imus[i] for i in order))
+
+
+def vehicle() -> Recording:
+    """Return a simulated recording of a robot: an IMU in each of two wheels and one on the body, no GNSS."""
+    from polyins.simulation.scenario import Board, Scenario, simulate
+    from polyins.simulation.wheel_scenario import WheelModule
+
+    half = 0.2
+    wheels = tuple(
+        WheelModule(name=name, position_m=(0.0, right, 0.0), radius_m=0.1, chips=1)
+        for name, right in (("left", -half), ("right", half))
+    )
+    return simulate(Scenario(duration_s=SECONDS, imus=Board(count=1), wheels=wheels, gnss=None, top_speed_m_s=2.0))
 
 
 def _processor() -> str:
