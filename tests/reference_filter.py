@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 R, V, PHI, BG, BA, SG, SA = (slice(3 * i, 3 * i + 3) for i in range(7))
 I3 = np.eye(3)
 
+SECOND_ORDER = 1.0 / 6.0
+"""of the rotation within an interval; KF-GINS and Wheel-INS leave it out"""
 METHODS = ("single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization")
 
 
@@ -254,7 +256,8 @@ def mechanize(
     """
     dt = current.dt
     factor = coning_factor(previous.dt, dt, rescale_coning)
-    rotation = 0.5 * cross(current.dtheta, current.dvel)
+    first = cross(current.dtheta, current.dvel)
+    rotation = 0.5 * first + SECOND_ORDER * cross(current.dtheta, first)
     sculling = factor * (cross(previous.dtheta, current.dvel) + cross(previous.dvel, current.dtheta))
     coning = factor * cross(previous.dtheta, current.dtheta)
     dvel_n = common.C @ (current.dvel + rotation + sculling)

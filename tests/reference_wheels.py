@@ -3,7 +3,7 @@
 Written from the geometry, for reading; earth, attitude, mechanization and error model are those of `reference_filter`.
 All IMUs live in one n frame. v is the vehicle frame, forward-right-down from the middle of the rear axle. An IMU on a
 wheel has x along the axle to the right; `position` is its wheel's centre in v. An IMU on the body has v's axes, up to
-the small rotation m that the filter may estimate: C_v<-b = I + m x.
+the small rotation m that the filter may estimate: C_v<-b = exp(m x).
 
 Error states, 24 per IMU: the 21 of `reference_filter` and three of the mounting:
 
@@ -48,6 +48,7 @@ from reference_filter import (
 
 from polyins.recording import Recording, RollingOptions
 from polyins.rig import DEG, Imu
+from scipy.spatial.transform import Rotation
 
 N = 24
 SPEED_ERROR = 21
@@ -89,7 +90,7 @@ def lever_arm(imu: Imu, state: WheelState) -> Array:
 
 def body_matrix(state: WheelState) -> Array:
     """C_n<-v as an IMU on the body has it."""
-    return state.C @ (I3 + skew(np.array([0.0, *state.mounting[1:]]))).T
+    return state.C @ np.asarray(Rotation.from_rotvec([0.0, *state.mounting[1:]]).as_matrix()).T
 
 
 def body_matrix_derivative(state: WheelState) -> Array:
@@ -97,8 +98,15 @@ def body_matrix_derivative(state: WheelState) -> Array:
     derivative = np.zeros((N, 3, 3))
     for j in range(3):
         derivative[6 + j] = -skew(I3[j]) @ body_matrix(state)
+    m = np.array([0.0, *state.mounting[1:]])
+    angle = float(np.linalg.norm(m))
+    # exp((m + dm) x) = exp(m x) exp((J dm) x)
+    jacobian = I3
+    if angle > 0.0:
+        first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+        jacobian = I3 - first * skew(m) + second * skew(m) @ skew(m)
     for j in (1, 2):
-        derivative[21 + j] = state.C @ skew(I3[j])
+        derivative[21 + j] = state.C @ skew(jacobian[:, j]) @ Rotation.from_rotvec(m).as_matrix().T
     return derivative
 
 
@@ -311,7 +319,7 @@ class WheelFilter:
             self.advance(*member) for member in zip(self.states, self.previous, current, strict=True)
         ]  # fmt: skip
         self.previous = current
-        self.epochs.append((before, self.states, raw[0].dt))
+        self.epochs.append((before, list(self.states), raw[0].dt))
         self.turned.append(np.array([increment.dtheta for increment in current]))
 
     def advance(self, state: WheelState, previous: Increment, current: Increment) -> WheelState:
@@ -393,21 +401,19 @@ class WheelFilter:
         return Update(self.earth.metres_per_unit(state.position) * off, rows, noise)
 
     def update_standing(self, velocity_std: float, rate_std: float) -> None:
-        """Zero velocity; then zero rate, the mean over the kept epochs."""
+        """Zero rate, the mean over the kept epochs; then zero velocity."""
         rates = [np.sum(turned, axis=0) / self.watched() for turned in zip(*self.turned, strict=True)]
-        before, none = [state.errors for state in self.states], np.zeros((3, N))
+        none = np.zeros((3, N))
 
         def zero_velocity(i: int) -> Update:
             return Update(self.states[i].velocity, self.rows(i, velocity_derivative(), none), velocity_std**2 * I3)
 
         def zero_rate(i: int) -> Update:
-            learned = self.states[i].errors - before[i]
-            rate = rates[i] - learned[:3] - learned[6:9] * self.previous[i].rate
-            residual = rate_over_ground(self.earth, self.states[i], rate)
+            residual = rate_over_ground(self.earth, self.states[i], rates[i])
             return Update(residual, self.rows(i, rate_derivative(self.previous[i].rate), none), rate_std**2 * I3)
 
-        self.correct(zero_velocity, len(self.imus))
         self.correct(zero_rate, len(self.imus))
+        self.correct(zero_velocity, len(self.imus))
 
     def stands(self) -> bool:
         """Whether no IMU has turned on the mean over the kept epochs."""

@@ -90,6 +90,33 @@ def test_a_figure_overrides_the_grade() -> None:
     assert noise.gyro_bias_deg_h == (1.0, 1.0, 1.0)
 
 
+@given(
+    st.floats(-500.0, 500.0),
+    st.one_of(st.none(), st.floats(0.0, 500.0)),
+    st.floats(1.0, 200.0),
+    st.floats(0.01, 0.99),
+    st.floats(0.0, 3000.0),
+)
+def test_a_schedule_has_all_the_whole_outages_and_no_other(
+    start: float, after: float | None, every: float, share: float, duration: float
+) -> None:
+    schedule = OutageSchedule(length_s=share * every, every_s=every, first_after_s=after)
+    first, end = start + (every - share * every if after is None else after), start + duration
+    intervals = schedule.intervals(start, end)
+    candidates = [first + k * every for k in range(4000)]
+    expected = [begin for begin in candidates if begin + share * every < end - 2e-6]
+    tolerant = [begin for begin in candidates if begin + share * every < end]
+    assert set(expected) <= {begin for begin, _ in intervals} <= set(tolerant)
+    assert all(stop - begin == pytest.approx(share * every) for begin, stop in intervals)
+
+
+def test_the_schedule_of_a_published_drive() -> None:
+    schedule = OutageSchedule(length_s=30.0, every_s=90.0, first_after_s=0.0)
+    intervals = schedule.intervals(271130.0, 273690.0)
+    assert len(intervals) == 29
+    assert (intervals[0], intervals[-1]) == ((271130.0, 271160.0), (273650.0, 273680.0))
+
+
 def test_outages_are_a_schedule_or_a_list() -> None:
     imus = [{"file": "a.csv"}]
     schedule = parsed({"imus": imus, "outages": {"length_s": 30, "every_s": 90}}).outages

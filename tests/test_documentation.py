@@ -34,7 +34,9 @@ import polyins as pi
 from polyins import cli, config
 from polyins.config import columns
 from polyins.io.yaml_document import read_yaml
+from polyins.recording import GnssStream, ImuStream, Reference
 from polyins.simulation import scenario
+from polyins.simulation.wheel_scenario import WheelModule
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PAGES = [REPOSITORY / "README.md", REPOSITORY / "CHANGELOG.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
@@ -103,14 +105,52 @@ def write_recording(folder: Path) -> None:
     )
     recording = pi.simulate(described)
     for name, stream in zip(("left", "right"), recording.imus, strict=True):
-        step = np.diff(stream.time, prepend=0.0)[:, None]
-        values = np.hstack([np.degrees(stream.dtheta / step), stream.dvel / step]) * [1, -1, -1, 1, -1, -1]
-        _write_csv(folder / f"{name}.csv", "t,gx,gy,gz,ax,ay,az", np.column_stack([stream.time, values]))
-    assert recording.gnss is not None
-    assert recording.reference is not None
-    for name, track in (("gnss", recording.gnss), ("truth", recording.reference)):
-        degrees = track.position * [180.0 / np.pi, 180.0 / np.pi, 1.0]
-        _write_csv(folder / f"{name}.csv", "t,lat,lon,height", np.column_stack([track.time, degrees]))
+        _write_imu(folder / f"{name}.csv", stream, FORWARD_LEFT_UP)
+    _write_positions(folder / "gnss.csv", recording.gnss)
+    _write_positions(folder / "truth.csv", recording.reference)
+
+
+WHEEL_RADIUS_M, BODY_CLOCK_S = 0.097, 3.2
+FORWARD_LEFT_UP = np.diag([1.0, -1.0, -1.0])
+"""C_sa: from the axes of array or module to those of the sensor"""
+OUTWARD = {"left": np.fliplr(np.diag([1.0, 1.0, -1.0])), "right": np.roll(np.eye(3), 1, axis=1)}
+"""the same for an IMU on a wheel whose z axis points outward"""
+
+
+def write_robot(folder: Path) -> None:
+    """Write an IMU on each wheel of a robot, one on its body, whose clock is ahead, GNSS and truth as CSV."""
+    wheels = tuple(
+        WheelModule(name=name, position_m=(0.0, right, 0.0), radius_m=WHEEL_RADIUS_M, chips=1)
+        for name, right in (("left", -0.165), ("right", 0.165))
+    )
+    described = scenario.Scenario(
+        duration_s=200,
+        static_s=20,
+        rate_hz=100,
+        top_speed_m_s=1.8,
+        imus=scenario.Board(count=1, position_m=(0.1, 0.0, -0.15)),
+        wheels=wheels,
+        outages=(),
+    )
+    recording = pi.simulate(described)
+    for stream in recording.imus:
+        name = stream.name.rstrip("1")
+        late = BODY_CLOCK_S if name == "body" else 0.0
+        _write_imu(folder / f"{name}-imu.csv", stream, OUTWARD.get(name, FORWARD_LEFT_UP), late)
+    _write_positions(folder / "antenna.csv", recording.gnss)
+    _write_positions(folder / "track.csv", recording.reference)
+
+
+def _write_imu(path: Path, stream: ImuStream, axes: np.ndarray[Any, Any], late: float = 0.0) -> None:
+    step = np.diff(stream.time, prepend=0.0)[:, None]
+    values = np.hstack([np.degrees(stream.dtheta / step) @ axes.T, stream.dvel / step @ axes.T])
+    _write_csv(path, "t,gx,gy,gz,ax,ay,az", np.column_stack([stream.time + late, values]))
+
+
+def _write_positions(path: Path, track: GnssStream | Reference | None) -> None:
+    assert track is not None
+    degrees = track.position * [180.0 / np.pi, 180.0 / np.pi, 1.0]
+    _write_csv(path, "t,lat,lon,height", np.column_stack([track.time, degrees]))
 
 
 def _write_csv(path: Path, header: str, values: np.ndarray[Any, Any]) -> None:
@@ -161,7 +201,24 @@ def test_readme_runs(desk: Path, data_folder_if_any: None, capsys: pytest.Captur
     assert summary["methods"]["enav-fusion"]["outages"]["count"] >= 2
     assert "single" in capsys.readouterr().out
     # the how-to reads what README's command wrote
+    write_robot(desk)
     follow(REPOSITORY / "docs" / "how-to.md", desk)
+    check_robot(desk)
+
+
+def check_robot(desk: Path) -> None:
+    """The how-to's robot drives, is calibrated, and its clock is found."""
+    summary = json.loads((desk / "robot" / "summary.json").read_text())
+    assert summary["method"] == "triple-ins"
+    assert summary["reference"]["horizontal_max_m"] < 0.3
+    joined = json.loads((desk / "joined" / "summary.json").read_text())
+    assert set(joined["methods"]) == {"wheel-ins", "triple-ins", "triple-ins/centralized"}
+    left, right, body = config.parse(read_yaml(desk / "robot-calibrated.yaml")).imus
+    for wheel in (left.wheel, right.wheel):
+        assert wheel is not None
+        assert wheel.radius_m == pytest.approx(WHEEL_RADIUS_M, rel=0.01)
+        assert wheel.lever_arm_m == pytest.approx((0.0, 0.015, 0.0), abs=1e-3)
+    assert body.clock_offset_s == pytest.approx(-BODY_CLOCK_S, abs=0.01)
 
 
 def test_tutorial_runs(desk: Path, data_folder_if_any: None, capsys: pytest.CaptureFixture[str]) -> None:
@@ -169,9 +226,15 @@ def test_tutorial_runs(desk: Path, data_folder_if_any: None, capsys: pytest.Capt
     assert (desk / "fused" / "solution.parquet").is_file()
     out = capsys.readouterr().out
     if not any("kfgins-parity" in text for text in left_out):
-        position = re.search(r"position (\S+) mm", out)
+        position = re.search(r"^position (\S+) mm", out, re.M)
         assert position
         assert float(position[1]) < 0.1
+    if not any("wheelins-parity" in text for text in left_out):
+        position = re.search(r"wheel-ins position (\S+) mm", out)
+        assert position
+        assert float(position[1]) < 2.0
+    compared = json.loads((desk / "rover-compared" / "summary.json").read_text())
+    assert compared["methods"]["triple-ins"]["drift"]["rate_percent"] < 0.5
     if left_out:
         pytest.skip(f"done but for {', '.join(left_out)} (set POLYINS_DATA)")
 

@@ -327,7 +327,7 @@ def build_inputs(recording: Recording, aligned: Aligned) -> Inputs:
     for begin, end in recording.outages:
         shown &= ~((gnss.time > begin) & (gnss.time < end))
     velocities = None
-    if gnss.velocity is not None and gnss.velocity_std is not None:
+    if gnss.velocity is not None and gnss.velocity_std is not None and not recording.rig.rolling:
         velocities = np.hstack([gnss.velocity, gnss.velocity_std**2])[shown]
     fixes = np.hstack([gnss.position, gnss.position_std**2])[shown]
     return Inputs(aligned.time, np.ascontiguousarray(aligned.increments), gnss.time[shown], fixes, velocities)
@@ -384,5 +384,12 @@ def _solution(run: Prepared, filter_s: float, first_call_s: float) -> Solution:
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,
-        warnings=recording.warnings + aligned.warnings,
+        warnings=recording.warnings + aligned.warnings + _unused(run),
     )
+
+
+def _unused(run: Prepared) -> tuple[str, ...]:
+    gnss = run.recording.gnss
+    if run.rolling is not None and gnss is not None and gnss.velocity is not None:
+        return ("gnss: velocities are not used with wheels, which give the speed; positions are",)
+    return ()

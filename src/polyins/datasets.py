@@ -53,6 +53,16 @@ DATASETS = {
         licence="see the source",
         source="https://github.com/i2Nav-WHU/Wheel-INS",
     ),
+    "whu-array": Dataset(
+        summary="what is public of 16 ICM-20602 on a car: its RTK track, 1 Hz, 23 km, the chips' calibrations, error curves",
+        licence="see the source",
+        source="https://github.com/i2Nav-WHU/IMU-Array",
+    ),
+    "whu-car": Dataset(
+        summary="the track, 1 Hz, and odometer speed, 2 Hz, of a car that drove 12.2 km with an IMU on a wheel",
+        licence="see the source",
+        source="https://github.com/i2Nav-WHU/Wheel-INS",
+    ),
     "wheelins-parity": Dataset(
         summary="a simulated wheel IMU of 300 s in Wheel-INS's formats, its truth, and what Wheel-INS computes from it",
         licence="made for polyins",

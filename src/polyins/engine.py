@@ -210,9 +210,9 @@ def aid_by_position(
         nis = _measure_position(state, fix)
     if rolling is not None:
         nis = wheels.measure_position(fix, blocks, groups, members, measurements, state.near, rolling, joined)
-    _record(state, nis, innovation)
+    _record(state, nis, innovation, rolling, joined)
     status = ACCEPTED
-    if not _passes_gate(state, plan, nis):
+    if not _passes_gate(state, plan, nis, rolling, joined):
         state.counters[1] += 1
         if state.counters[1] <= plan.reopen_after:
             return REJECTED
@@ -253,31 +253,45 @@ def aid_by_velocity(state: State, plan: Plan, fix: Array) -> bool:
             m[kalman.R + a] = fix[3 + a]
         kalman.gain(g, m)
         nis += kalman.normalized_innovation_squared(m) / state.members.shape[0]
-    if not _passes_gate(state, plan, nis):
+    if not _passes_gate(state, plan, nis, None, None):
         return False
     _correct(state)
     return True
 
 
 @kernel
-def _passes_gate(state: State, plan: Plan, nis: float) -> bool:
-    if nis <= plan.gate_limit:
-        return True
-    cautious = 0.0
-    for s in range(state.members.shape[0]):
-        cautious += kalman.cautious_innovation_squared(state.measurements[s], CAUTION) / state.members.shape[0]
-    return cautious <= plan.gate_limit
+def _has_measured(s: int, rolling: Rolling | None, joined: Joint | None) -> bool:
+    """Whether the measurement of a share is of this fix: silent ones have none, joined ones the first for all."""
+    if joined is not None:
+        return s == 0
+    if rolling is not None:
+        return bool(rolling.silent[s] < 0.0)
+    return True
 
 
 @kernel
-def _record(state: State, nis: float, innovation: Array) -> None:
-    shares = state.members.shape[0]
-    for a in range(3):
-        innovation[a] = 0.0
-        innovation[3 + a] = 0.0
-        for s in range(shares):
-            innovation[a] += state.measurements[s, kalman.RESIDUAL + a] / shares
-            innovation[3 + a] += state.measurements[s, kalman.S + 4 * a] / shares
+def _passes_gate(state: State, plan: Plan, nis: float, rolling: Rolling | None, joined: Joint | None) -> bool:
+    if nis <= plan.gate_limit:
+        return True
+    cautious, measured = 0.0, 0
+    for s in range(state.members.shape[0]):
+        if _has_measured(s, rolling, joined):
+            cautious += kalman.cautious_innovation_squared(state.measurements[s], CAUTION)
+            measured += 1
+    return cautious <= plan.gate_limit * measured
+
+
+@kernel
+def _record(state: State, nis: float, innovation: Array, rolling: Rolling | None, joined: Joint | None) -> None:
+    innovation[:] = 0.0
+    measured = 0
+    for s in range(state.members.shape[0]):
+        if _has_measured(s, rolling, joined):
+            measured += 1
+            for a in range(3):
+                innovation[a] += state.measurements[s, kalman.RESIDUAL + a]
+                innovation[3 + a] += state.measurements[s, kalman.S + 4 * a]
+    innovation[:6] /= max(measured, 1)
     innovation[6] = nis
 
 

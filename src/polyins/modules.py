@@ -208,6 +208,9 @@ def joined(shares: int) -> Joint:
         hp=np.zeros((3, size)),
         gain=np.zeros((3, size)),
         ah=np.zeros((3, size)),
+        rows=np.zeros((shares, 3, size)),
+        learned=np.zeros(size),
+        z=np.zeros(3),
         work=np.zeros(joint.SIZE),
     )
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from polyins.evaluation.drift import drift
+from polyins.evaluation.drift import drift, drift_curve, drift_rates
 from polyins.evaluation.errors import Errors
 
 
@@ -43,3 +43,27 @@ def test_too_short_a_way_has_no_rate():
     still = drift(errors_of(np.zeros(3), np.ones(3)))
     assert (still["rate_percent"], still["end_percent"]) == (None, None)
     assert drift(None) == {"step_m": 100.0, "distance_m": None, "rate_percent": None, "end_percent": None}
+
+
+def test_the_curve_is_the_maximum_so_far_over_the_way_so_far():
+    distance = np.arange(0.0, 301.0)
+    errors = errors_of(distance, np.where(distance == 50.0, 3.0, 0.0))
+    curve = drift_curve(errors)
+    assert np.isnan(curve[0])
+    assert curve[49] == 0.0
+    np.testing.assert_allclose(curve[50:], 300.0 / distance[50:])
+
+
+def test_the_rate_is_the_mean_of_the_curve_at_the_multiples():
+    distance = np.linspace(0.0, 550.0, 2201)
+    errors = errors_of(distance, np.random.default_rng(1).normal(size=distance.size).cumsum())
+    multiples, rates = drift_rates(errors)
+    np.testing.assert_array_equal(multiples, [100.0, 200.0, 300.0, 400.0, 500.0])
+    np.testing.assert_allclose(rates, drift_curve(errors)[np.searchsorted(distance, multiples)])
+    assert drift(errors)["rate_percent"] == pytest.approx(rates.mean())
+
+
+def test_a_vehicle_that_stands_has_no_curve():
+    errors = errors_of(np.zeros(3), np.ones(3))
+    assert np.isnan(drift_curve(errors)).all()
+    assert drift_rates(errors)[0].size == 0

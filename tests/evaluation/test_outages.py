@@ -4,12 +4,10 @@ import gzip
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from polyins.errors import InputError
+from polyins.config import OutageSchedule
 from polyins.evaluation.errors import Errors
-from polyins.evaluation.outages import outage_statistic, partly_covered, periodic
+from polyins.evaluation.outages import outage_statistic, partly_covered
 
 
 def errors_of(time: np.ndarray, north: np.ndarray, east: np.ndarray | float = 0.0) -> Errors:
@@ -56,32 +54,6 @@ def test_outages_that_the_errors_cover_in_part_are_named():
     assert partly_covered(errors_of(np.zeros(0), np.zeros(0)), [(0.0, 1.0)]) == [(0.0, 1.0)]
 
 
-@given(st.floats(-500.0, 500.0), st.floats(1.0, 200.0), st.floats(0.01, 1.0), st.floats(0.0, 3000.0))
-def test_a_periodic_schedule_has_all_the_whole_outages_and_no_other(first, every, share, duration):
-    length = share * every
-    begin, end = 10.0, 10.0 + duration
-    outages = periodic(first, every, length, begin, end)
-    candidates = [first + k * every for k in range(4000)]
-    expected = [start for start in candidates if begin <= start and start + length <= end]
-    tolerant = [start for start in candidates if begin - 2e-6 <= start and start + length <= end + 2e-6]
-    starts = [start for start, _ in outages]
-    assert set(expected) <= set(starts) <= set(tolerant)
-    assert all(stop - start == pytest.approx(length) for start, stop in outages)
-
-
-def test_the_schedule_of_paper_a():
-    outages = periodic(271130.0, 90.0, 30.0, 270000.0, 271130.0 + 28 * 90.0 + 30.0)
-    assert len(outages) == 29
-    assert outages[0] == (271130.0, 271160.0)
-    assert outages[-1] == (273650.0, 273680.0)
-
-
-@pytest.mark.parametrize(("every", "length"), [(90.0, 0.0), (90.0, 91.0), (0.0, 0.0), (90.0, float("nan"))])
-def test_an_impossible_schedule_is_refused(every, length):
-    with pytest.raises(InputError, match="0 < length <= every"):
-        periodic(0.0, every, length, 0.0, 1000.0)
-
-
 def test_published_curve_of_a_compensated_array_gives_the_published_figure(data_folder):
     file = data_folder / "whu-array" / "array_compensated_outage_errors.txt.gz"
     if not file.is_file():
@@ -89,6 +61,7 @@ def test_published_curve_of_a_compensated_array_gives_the_published_figure(data_
     with gzip.open(file, "rt") as lines:
         table = np.loadtxt(lines)
     errors = errors_of(table[:, 0], table[:, 1], table[:, 2])
-    statistic = outage_statistic(errors, periodic(271130.0, 90.0, 30.0, table[0, 0], 271130.0 + 28 * 90.0 + 30.0))
+    schedule = OutageSchedule(length_s=30.0, every_s=90.0, first_after_s=0.0)
+    statistic = outage_statistic(errors, schedule.intervals(271130.0, 273690.0))
     assert statistic["count"] == 29
     assert statistic["horizontal_max_rms_m"] == pytest.approx(2.0563, abs=2e-3)

@@ -72,6 +72,17 @@ def test_a_solution_that_diverged_gives_null_and_says_so():
     assert any("not finite at 701 of 1201" in warning for warning in document["warnings"])
 
 
+@pytest.mark.parametrize(("epochs", "told"), [(1195, False), (1180, True)])
+def test_a_reference_that_ends_a_little_early_is_not_told_of(epochs, told):
+    """Half a second, and two seconds, of two minutes."""
+    truth = drive()
+    early = reference(
+        truth, time=truth.time[:epochs], position=truth.geodetic[:epochs], velocity=None, attitude=None
+    )
+    warnings = summarize(solution(truth), early, [])["warnings"]
+    assert any(f"covers {epochs} of 1201 epochs" in warning for warning in warnings) == told
+
+
 def test_a_reference_that_ends_early_is_told_of():
     truth = drive()
     early = reference(truth, time=truth.time[:900], position=truth.geodetic[:900], velocity=None, attitude=None)

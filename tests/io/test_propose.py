@@ -29,6 +29,18 @@ def test_a_proposal_loads_right_away(tmp_path: Path) -> None:
     assert text.count("# CHECK: forward, right, down from the array's origin") == 3
 
 
+def test_what_files_cannot_tell_is_marked(tmp_path: Path) -> None:
+    write_recording(tmp_path)
+    imus, gnss = [tmp_path / "a.txt", tmp_path / "b.csv"], tmp_path / "gnss.txt"
+    text = propose([*imus, gnss])
+    assert text.count("mount_deg: [0, 0, 0]  # CHECK:") == 2
+    assert text.count("clock_offset_s: 0.0  # CHECK:") == 2  # of all streams but the first, whose clock counts
+    assert text.count("heading_from: auto  # CHECK: the course over ground") == 1
+    alone = propose(imus)
+    assert "heading_deg: 0.0  # CHECK:" in alone
+    assert load(save(tmp_path, alone)).start.heading == 0.0
+
+
 @pytest.mark.parametrize("order", [[1, 2, 3], [2, -1, 3], [3, 1, 2], [-3, 2, 1], [1, -2, -3]])
 def test_gravity_tells_what_is_down(order: list[int], tmp_path: Path) -> None:
     rows = as_increments(still_imu())

@@ -291,20 +291,30 @@ def test_polyins_starts_where_the_configuration_says(solution: Solution) -> None
 
 
 def test_polyins_goes_where_the_program_goes(solution: Solution, folder: Path) -> None:
-    """The reference point is the wheel's centre, and the vehicle's heading the IMU's yaw less 90 degrees."""
+    """The reference point is the wheel's centre, and the vehicle's heading the IMU's yaw less 90 degrees.
+
+    What is left, 0.07 mm, is the axle's tilt, which that program leaves out of the heading error.
+    """
     expected = np.loadtxt(folder / "expected_traj.txt.gz")
     k = rows_at(solution.time, expected[:, 0])
     assert len(k) == 6000
-    assert np.abs(solution.position[k] - expected[:, 1:4] * [1.0, 1.0, -1.0]).max() < 0.3
-    assert np.abs(wrapped(heading_deg(solution)[k] - expected[:, 9] + 90.0)).max() < 0.05
+    assert np.abs(solution.position[k] - expected[:, 1:4] * [1.0, 1.0, -1.0]).max() < 2e-3
+    assert np.abs(wrapped(heading_deg(solution)[k] - expected[:, 9] + 90.0)).max() < 1e-4
 
 
-def test_polyins_finds_the_same_gyro_bias(solution: Solution, folder: Path) -> None:
-    """The biases in the wheel's plane are modulated away; within a fraction of what is left of them unknown."""
+def test_polyins_finds_the_same_imu_errors(solution: Solution, folder: Path) -> None:
+    """In units of what is left of them unknown.
+
+    The accelerometers in the wheel are another matter: that program leaves out the second order of the rotation within
+    an interval, 0.1 % of the force here, and takes it for their errors.
+    """
     expected, std = (np.loadtxt(folder / f"expected_{name}.txt.gz") for name in ("imu_err", "std"))
     errors = np.array([np.interp(expected[:, 0], solution.imu_error_time, e) for e in solution.imu_errors[:, 0].T]).T
     late = expected[:, 0] > 1020.0
-    assert np.abs((errors * UNITS[9:] - expected[:, 1:]) / std[:, 10:])[late].max() < 0.5
+    off = np.abs((errors * UNITS[9:] - expected[:, 1:]) / std[:, 10:])[late].max(axis=0)
+    in_wheel = [4, 5, 10, 11]
+    assert np.delete(off, in_wheel).max() < 1e-2
+    assert off[in_wheel].max() < 1.0
 
 
 def test_polyins_is_near_the_truth(solution: Solution, folder: Path) -> None:
@@ -314,4 +324,6 @@ def test_polyins_is_near_the_truth(solution: Solution, folder: Path) -> None:
     travelled = np.concatenate([[0.0], np.hypot(*np.diff(truth[:, 1:3], axis=0).T).cumsum()])
     off = np.hypot(*(at - truth[:, 1:3]).T)
     assert travelled[-1] > 1000.0
-    assert off.max() < 0.01 * travelled[-1]
+    assert off.max() < 1e-3 * travelled[-1]
+    heading = np.interp(truth[:, 0], solution.time, np.unwrap(heading_deg(solution), period=360.0))
+    assert np.abs(wrapped(heading - truth[:, 3])).max() < 0.3

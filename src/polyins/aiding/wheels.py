@@ -76,6 +76,11 @@ class Joint(NamedTuple):
     hp: Array
     gain: Array
     ah: Array
+    rows: Array
+    """(shares, 3, .): design matrices of one epoch's measurements"""
+    learned: Array
+    """what they have taught so far, the error states"""
+    z: Array
     work: Array
 
 
@@ -139,7 +144,7 @@ def measure(s: int, blocks: Array, groups: Array, members: Array, near: Array, r
     for i in range(first, last):
         z = _residual(blocks[i // LANES], i % LANES, lent, rolling, near)
         for a in range(3):
-            blocks[i // LANES, bank.CORRECTION + a * LANES + i % LANES] = z[a]
+            blocks[i // LANES, bank.RESIDUAL + a * LANES + i % LANES] = z[a]
             m[kalman.RESIDUAL + a] += z[a] / (last - first)
 
 
@@ -168,9 +173,7 @@ def correct_each(
 
 @kernel
 def _member_correction(w: Array, lane: int, m: Array) -> None:
-    z0 = w[bank.CORRECTION + lane]
-    z1 = w[bank.CORRECTION + LANES + lane]
-    z2 = w[bank.CORRECTION + 2 * LANES + lane]
+    z0, z1, z2 = w[bank.RESIDUAL + lane], w[bank.RESIDUAL + LANES + lane], w[bank.RESIDUAL + 2 * LANES + lane]
     for k in range(STATES):
         r = kalman.K + kalman.ROWS * k
         w[bank.CORRECTION + k * LANES + lane] = m[r] * z0 + m[r + 1] * z1 + m[r + 2] * z2
@@ -209,38 +212,49 @@ def add_rows(s: int, sign: float, groups: Array, rolling: Rolling, m: Array, h: 
 
 
 @kernel
-def correct_all(
-    measured: int,
-    residual: Array,
-    blocks: Array,
-    groups: Array,
-    members: Array,
-    near: Array,
-    rolling: Rolling,
-    joined: Joint,
-    m: Array,
-    dt: float,
+def _teach_all(
+    measured: int, z: Array, blocks: Array, members: Array, rolling: Rolling, joined: Joint, m: Array
 ) -> None:
-    """Update the joined covariance and feed back: the members of `measured` by their own residuals, others by the mean.
+    """Update the joined covariance and add to every member's correction; the gain of all states is known.
 
-    The gain of all states is known.
+    `z` is the residual. A member of the share `measured` differs from its mean by its own.
     """
     joint.update(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, joined.ah)
     k = joined.gain
     for s in range(members.shape[0]):
         if rolling.silent[s] >= 0.0:
             continue
+        for n in range(STATES):
+            j = s * STATES + n
+            joined.learned[j] += k[0, j] * z[0] + k[1, j] * z[1] + k[2, j] * z[2]
         for i in range(members[s, 0], members[s, 1]):
             w, lane = blocks[i // LANES], i % LANES
-            z0, z1, z2 = residual[0], residual[1], residual[2]
+            z0, z1, z2 = z[0], z[1], z[2]
             if s == measured:
-                z0 = w[bank.CORRECTION + lane]
-                z1 = w[bank.CORRECTION + LANES + lane]
-                z2 = w[bank.CORRECTION + 2 * LANES + lane]
+                z0 += w[bank.RESIDUAL + lane] - m[kalman.RESIDUAL]
+                z1 += w[bank.RESIDUAL + LANES + lane] - m[kalman.RESIDUAL + 1]
+                z2 += w[bank.RESIDUAL + 2 * LANES + lane] - m[kalman.RESIDUAL + 2]
             for n in range(STATES):
                 j = s * STATES + n
-                w[bank.CORRECTION + n * LANES + lane] = k[0, j] * z0 + k[1, j] * z1 + k[2, j] * z2
-        _feed_back(s, blocks, groups, members, near)
+                w[bank.CORRECTION + n * LANES + lane] += k[0, j] * z0 + k[1, j] * z1 + k[2, j] * z2
+
+
+@kernel
+def _begin_teaching(blocks: Array, groups: Array, members: Array, joined: Joint) -> None:
+    joint.gather(groups, members.shape[0], joined.whole)
+    joined.learned[:] = 0.0
+    for b in range(blocks.shape[0]):
+        blocks[b, bank.CORRECTION : bank.CORRECTION + STATES * LANES] = 0.0
+
+
+@kernel
+def _end_teaching(
+    blocks: Array, groups: Array, members: Array, near: Array, rolling: Rolling, joined: Joint, dt: float
+) -> None:
+    joint.scatter(groups, members.shape[0], joined.whole)
+    for s in range(members.shape[0]):
+        if rolling.silent[s] < 0.0:
+            _feed_back(s, blocks, groups, members, near)
     settle(blocks, groups, members, rolling, dt)
 
 
@@ -255,30 +269,45 @@ def _aid_all(
     joined: Joint,
     dt: float,
 ) -> None:
-    """One measurement of every share one after the other, or of the differences of their points, all states at once."""
-    kind = rolling.given[KIND]
-    joint.gather(groups, members.shape[0], joined.whole)
+    """One measurement of every share, or of the differences of their points, as if all were one.
+
+    All are measured at the same states and then applied one after the other, each residual less what those before it
+    have taught.
+    """
+    pairs = rolling.given[KIND] == POINT
+    _begin_teaching(blocks, groups, members, joined)
+    joined.rows[:] = 0.0
+    for s in range(members.shape[0]):
+        if _speaks(s, rolling):
+            measure(s, blocks, groups, members, near, rolling, measurements[s])
+            add_rows(s, 1.0, groups, rolling, measurements[s], joined.rows[s])
     before = -1
     for s in range(members.shape[0]):
-        if rolling.silent[s] >= 0.0 or (rolling.lenders[s] >= 0 and rolling.silent[rolling.lenders[s]] >= 0.0):
+        if not _speaks(s, rolling):
             continue
-        if kind != POINT or before >= 0:
-            m = measurements[s]
-            joined.h[:] = 0.0
-            measure(s, blocks, groups, members, near, rolling, m)
-            add_rows(s, 1.0, groups, rolling, m, joined.h)
-            if kind == POINT:
-                other = measurements[before]
-                measure(before, blocks, groups, members, near, rolling, other)
-                add_rows(before, -1.0, groups, rolling, other, joined.h)
-                for a in range(3):
-                    m[kalman.RESIDUAL + a] -= other[kalman.RESIDUAL + a]
+        m = measurements[s]
+        if not pairs or before >= 0:
+            for a in range(3):
+                joined.z[a] = m[kalman.RESIDUAL + a]
+                for j in range(joined.h.shape[1]):
+                    joined.h[a, j] = joined.rows[s, a, j]
+                if pairs:
+                    joined.z[a] -= measurements[before, kalman.RESIDUAL + a]
+                    for j in range(joined.h.shape[1]):
+                        joined.h[a, j] -= joined.rows[before, a, j]
+                for j in range(joined.h.shape[1]):
+                    joined.z[a] -= joined.h[a, j] * joined.learned[j]
             joint.gain(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, m)
-            measured = s if kind != POINT else -1
-            z = m[kalman.RESIDUAL : kalman.RESIDUAL + 3]
-            correct_all(measured, z, blocks, groups, members, near, rolling, joined, m, dt)
+            _teach_all(-1 if pairs else s, joined.z, blocks, members, rolling, joined, m)
         before = s
-    joint.scatter(groups, members.shape[0], joined.whole)
+    _end_teaching(blocks, groups, members, near, rolling, joined, dt)
+
+
+@kernel
+def _speaks(s: int, rolling: Rolling) -> bool:
+    """Whether neither the share is silent nor the one that lends roll and pitch to it."""
+    lender = rolling.lenders[s]
+    return rolling.silent[s] < 0.0 and (lender < 0 or rolling.silent[lender] < 0.0)
 
 
 @kernel
@@ -345,10 +374,11 @@ def _end_window(
     still = settings[STANDSTILL] != 0.0 and _stands(blocks, members, rolling, duration)
     memory[STILL] += since if still else 0.0
     if still:
-        variance = settings[ZERO_VELOCITY_VARIANCE]
-        _aid(ZERO_VELOCITY, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
+        # the rate was watched with the errors as they still are
         variance = settings[ZERO_RATE_VARIANCE]
         _aid(ZERO_RATE, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
+        variance = settings[ZERO_VELOCITY_VARIANCE]
+        _aid(ZERO_VELOCITY, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
     elif math.isfinite(given[G_SPEED]):
         _aid(SPEED, 0.0, blocks, groups, members, measurements, near, rolling, joined, dt)
 
@@ -572,7 +602,7 @@ def measure_position_all(
 ) -> float:
     """Measure a GNSS position with the mean of what all shares predict, since its noise is one; return the NIS."""
     _know(fix, rolling)
-    joint.gather(groups, members.shape[0], joined.whole)
+    _begin_teaching(blocks, groups, members, joined)
     joined.h[:] = 0.0
     speaking = 0
     for s in range(members.shape[0]):
@@ -634,6 +664,7 @@ def correct_by_position(
         correct_each(blocks, groups, members, measurements, near, rolling, dt)
     else:
         m = measurements[0]
-        z = m[kalman.RESIDUAL : kalman.RESIDUAL + 3]
-        correct_all(-1, z, blocks, groups, members, near, rolling, joined, m, dt)
-        joint.scatter(groups, members.shape[0], joined.whole)
+        _teach_all(-1, m[kalman.RESIDUAL : kalman.RESIDUAL + 3], blocks, members, rolling, joined, m)
+        _end_teaching(blocks, groups, members, near, rolling, joined, dt)
+    # what was watched before the states were corrected does not fit them any more
+    rolling.memory[WATCHED] = -1.0

@@ -24,7 +24,7 @@ class Filter(Section):
     """What the filter is told beyond the sensors."""
 
     gate_limit: Positive | None = FilterOptions.gate_limit
-    """a fix whose normalized innovation squared exceeds this is rejected; null: none is"""
+    """a fix is rejected whose normalized innovation squared, at fourfold prediction std, exceeds this; null: none is"""
     gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = FilterOptions.gate_reopen_after
     """after that many rejections in a row the next fix is believed"""
     gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0, le=0.1)] = FilterOptions.gnss_snap

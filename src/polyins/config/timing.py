@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from polyins.config.fields import Number, Pair, Positive, Section, Spread, Triple, number
+
+ROUNDING_S = 1e-6
+"""what time stamps such as GPS seconds of the week are exact to"""
 
 
 class StartPosition(Section):
@@ -80,6 +84,17 @@ class OutageSchedule(Section):
         if self.every_s <= self.length_s:
             raise ValueError(f"every_s is {self.every_s:g}; expected more than length_s, {self.length_s:g}")
         return self
+
+    def first_begin(self, start: float) -> float:
+        """Return when the first outage begins if GNSS is there from `start`, s."""
+        return start + (self.every_s - self.length_s if self.first_after_s is None else self.first_after_s)
+
+    def intervals(self, start: float, end: float) -> tuple[tuple[float, float], ...]:
+        """Return from and to of the outages that are over before `end`, s, if GNSS is there from `start`."""
+        first = self.first_begin(start)
+        count = math.ceil((end - ROUNDING_S - self.length_s - first) / self.every_s)
+        begins = [first + k * self.every_s for k in range(count)]
+        return tuple((begin, begin + self.length_s) for begin in begins)
 
 
 def _outage_kind(value: object) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from polyins.evaluation.errors import Errors
@@ -34,14 +33,16 @@ def drift(errors: Errors | None, step: float = 100.0) -> dict[str, float | None]
 def drift_rates(errors: Errors, step: float = 100.0) -> tuple[Array, Array]:
     """Return the multiples of `step` travelled, m, and the drift rate at each, percent, shape (K,) both."""
     distance = float(errors.distance[-1]) if errors.distance.size else 0.0
-    multiples = step * np.arange(1, int(distance / step) + 1)
+    multiples = step * np.arange(1, int(distance / step) + 1, dtype=np.float64)
     multiples = multiples[multiples <= distance]  # a quotient may be rounded up
     reached = np.searchsorted(errors.distance, multiples)
-    return multiples, 100.0 * np.maximum.accumulate(errors.horizontal)[reached] / multiples
+    rates: Array = 100.0 * np.maximum.accumulate(errors.horizontal)[reached] / multiples
+    return multiples, rates
 
 
 def drift_curve(errors: Errors) -> Array:
     """Return the maximum horizontal error so far over the distance so far, percent, shape (E,); NaN before any."""
     rate = np.full(errors.distance.shape, np.nan)
     so_far = np.maximum.accumulate(errors.horizontal)
-    return np.divide(100.0 * so_far, errors.distance, out=rate, where=errors.distance > 0.0)
+    np.divide(100.0 * so_far, errors.distance, out=rate, where=errors.distance > 0.0)
+    return rate

@@ -7,22 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.errors import InputError
 from polyins.evaluation.errors import ROUNDING_S, Errors, rms
 
 Interval = tuple[float, float]
-
-
-def periodic(first: float, every: float, length: float, begin: float, end: float) -> tuple[Interval, ...]:
-    """Return the outages of `length` s that start at `first`, `first + every`, ... and lie whole in [begin, end].
-
-    Raises InputError if they overlap or have no length.
-    """
-    if not 0.0 < length <= every:
-        raise InputError(f"outages: length {length} s every {every} s; expected 0 < length <= every")
-    skipped = max(0, int(np.ceil((begin - first - ROUNDING_S) / every)))
-    count = int(np.floor((end + ROUNDING_S - length - first) / every)) + 1
-    return tuple((first + k * every, first + k * every + length) for k in range(skipped, count))
 
 
 def outage_statistic(errors: Errors | None, outages: Sequence[Interval]) -> dict[str, object]:

@@ -12,8 +12,8 @@ from polyins import __version__
 from polyins.evaluation.consistency import consistency
 from polyins.evaluation.drift import drift
 from polyins.evaluation.errors import Errors, compare_to_reference, rms
-from polyins.methods import METHODS
 from polyins.evaluation.outages import Interval, outage_statistic, partly_covered
+from polyins.methods import METHODS
 from polyins.recording import Reference
 from polyins.solution import Innovations, Solution
 
@@ -22,6 +22,10 @@ Document = dict[str, Any]
 """what `json.dumps` takes, with None instead of NaN"""
 
 GNSS_COUNTS = ("fixes", "rejected", "reopened", "velocities_rejected")
+
+NEGLIGIBLE_SHARE = 0.01
+NEGLIGIBLE_S = 1.0
+"""A reference may lack less than this of the epochs, and less than this of the time, without a warning."""
 
 NO_FIGURES = dict.fromkeys(
     ("horizontal_rms_m", "horizontal_max_m", "vertical_rms_m", "roll_rmse_deg", "pitch_rmse_deg", "heading_rmse_deg")
@@ -115,7 +119,7 @@ def figure(summary: Document | None) -> float | None:
 
 
 def on_wheels(summary: Mapping[str, Any]) -> bool:
-    """Return whether wheels aided the run; not so of a method that is unknown, as a solution read from a file may be."""
+    """Return whether wheels aided the run; of a method that is not known, as in a solution from elsewhere, no."""
     row = METHODS.get(summary["method"].split("/")[0])
     return row is not None and row.rolling
 
@@ -161,13 +165,15 @@ def _warnings(solution: Solution, errors: Errors | None, outages: Sequence[Inter
     if broken:
         found.append(f"the solution is not finite at {broken} of {solution.time.size} epochs: it diverged")
     if errors is not None:
-        found.extend(_coverage_warnings(errors, outages))
+        found.extend(_coverage_warnings(solution, errors, outages))
     return found
 
 
-def _coverage_warnings(errors: Errors, outages: Sequence[Interval]) -> list[str]:
+def _coverage_warnings(solution: Solution, errors: Errors, outages: Sequence[Interval]) -> list[str]:
     found = []
-    if errors.epochs_without_reference:
+    share = errors.epochs_without_reference / max(solution.time.size, 1)
+    # streams hardly ever begin and end together
+    if share > NEGLIGIBLE_SHARE and share * np.ptp(solution.time) >= NEGLIGIBLE_S:
         found.append(
             f"reference: covers {errors.time.size} of {errors.covered.size} epochs; "
             f"{errors.epochs_without_reference} are left out of the errors"

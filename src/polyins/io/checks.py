@@ -29,6 +29,8 @@ FARTHEST_OFF_AXIS_M = 1.0
 """what a sensor of unknown mount may be off the axis of a wheel"""
 RATES_HZ = (5.0, 20000.0)
 GAP_INTERVALS = 1.5
+"""A longer step means that rows are missing, which is a warning. Where one or two are, the rate of the row after the
+step is taken for all of it; from `timesync.GAP` intervals on a gap is bridged."""
 JITTER = 0.2
 UPRIGHT = 0.5
 """Cosine of the largest angle between up in the array and the mean specific force."""

@@ -33,7 +33,7 @@ def propose(paths: Sequence[str | Path]) -> str:
     marked = f"What says {CHECK[2:]} is guessed or unknown."
     lines = [f"# {len(imus)} IMU file(s), {len(tracks)} file(s) of positions. {marked}", "imus:"]
     for number, (path, rows, notes) in enumerate(imus, 1):
-        lines += _imu_lines(f"imu{number}", path, rows, notes)
+        lines += _imu_lines(number, path, rows, notes)
     span = (max(rows.time[0] for _, rows, _ in imus), min(rows.time[-1] for _, rows, _ in imus))
     # A file with attitude is a reference rather than a receiver's, if there is a choice.
     tracks.sort(key=lambda item: item[1].attitude is not None)
@@ -42,24 +42,37 @@ def propose(paths: Sequence[str | Path]) -> str:
     for section, (path, track, notes) in zip(sections, tracks, strict=False):
         lines += ["", f"{section}:", *_track_lines(section, path, track, notes, span)]
     lines += [f"{CHECK} {path} also holds positions and is not used" for path, _, _ in tracks[len(sections) :]]
+    lines += ["", "start:", _heading_line(bool(tracks) and not only_solution, [track for _, track, _ in tracks])]
     return "\n".join(lines) + "\n"
 
 
-def _imu_lines(name: str, path: str | Path, rows: ImuRows, notes: tuple[str, ...]) -> list[str]:
+def _heading_line(gnss: bool, tracks: list[Track]) -> str:
+    """Return where the heading comes from: of what a start needs, the one thing that data at rest do not tell."""
+    if gnss:
+        return f"  heading_from: auto  {CHECK} the course over ground; is it the heading? else heading_deg or reference"
+    if any(track.attitude is not None for track in tracks):
+        return f"  heading_from: auto  {CHECK} that of the reference"
+    return f"  heading_deg: 0.0  {CHECK} clockwise from north; no file tells it"
+
+
+def _imu_lines(number: int, path: str | Path, rows: ImuRows, notes: tuple[str, ...]) -> list[str]:
     facts = describe(rows)
     force = np.array(facts["accel_mean_m_s2"] or [0.0, 0.0, -9.8], dtype=float)
     axes = upright_axes(("x", "y", "z"), force)
     mean = ", ".join(f"{value:.1f}" for value in force)
-    lines = [f"  - name: {name}", f"    file: {_quoted(path)}", *_format_lines(path, notes, "    ")]
+    lines = [f"  - name: imu{number}", f"    file: {_quoted(path)}", *_format_lines(path, notes, "    ")]
     lines.append(f"    # {facts['rows']} rows, {facts['duration_s']:.1f} s at {facts['rate_hz'] or 0.0:.2f} Hz")
     if facts["repeated_stamps"]:
         rate = (facts["rows"] - 1) / facts["duration_s"]
         repeated = facts["repeated_stamps"]
         lines.append(f"    rate_hz: {rate:.6g}  {CHECK} {repeated} stamp(s) repeat, so rows are counted")
+    if number > 1:
+        lines.append(f"    clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s")
     return [
         *lines,
         f"    # at rest or on average the sensor feels [{mean}] m/s^2, so down is known; forward is not",
         f"    axes: [{', '.join(axes)}]  {CHECK} sensor axes that point forward, right, down; forward is a guess",
+        f"    mount_deg: [0, 0, 0]  {CHECK} roll, pitch, yaw that the axes are off by, deg",
         f"    position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
         f"    noise: consumer-mems  {CHECK} a grade (consumer-mems, industrial-mems, tactical) or figures",
     ]
@@ -91,6 +104,8 @@ def _track_lines(
             f"  clock_offset_s: 0.0  {CHECK} the IMUs' stamps run from {span[0]:.3f} to {span[1]:.3f} s; give what "
             "brings these to the same clock"
         )
+    else:
+        lines.append(f"  clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s")
     point = "antenna_position_m" if section == "gnss" else "point_m"
     lines.append(f"  {point}: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m")
     if section == "gnss" and track.position_std is None:

@@ -102,11 +102,10 @@ def _check_outages(outages: list[Span], place: str, span: Span) -> None:
 
 
 def _scheduled(schedule: OutageSchedule, begin: float, end: float, place: str) -> tuple[Span, ...]:
-    after = schedule.every_s - schedule.length_s if schedule.first_after_s is None else schedule.first_after_s
-    firsts = np.arange(begin + after, end - schedule.length_s, schedule.every_s)
-    if not len(firsts):
+    outages = schedule.intervals(begin, end)
+    if not outages:
         raise InputError(
-            f"{place}: no outage of {schedule.length_s:g} s fits after {begin + after:.3f} s; "
+            f"{place}: no outage of {schedule.length_s:g} s fits after {schedule.first_begin(begin):.3f} s; "
             f"expected it to end with the data, at {end:.3f} s"
         )
-    return tuple((float(first), float(first) + schedule.length_s) for first in firsts)
+    return outages

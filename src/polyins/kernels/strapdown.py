@@ -85,6 +85,8 @@ def evaluate_at_own_state(w: Array) -> None:
 def correct_coning_and_sculling(w: Array, ratio: float) -> None:
     """Write the rotation vector, and the velocity increment with rotation and sculling terms (over DVEL).
 
+    The rotation's second order counts where an IMU turns with a wheel: 0.2 rad per interval make 0.7 % of the force.
+
     `ratio` is 1/12 for intervals of equal length; for a previous one of T1 and a current one of T2 seconds it is
     T2^2 / (6 T1 (T1 + T2)), from rates and forces linear in time over both.
     """
@@ -99,9 +101,10 @@ def correct_coning_and_sculling(w: Array, ratio: float) -> None:
         sx = py * vz - pz * vy + uy * tz - uz * ty
         sy = pz * vx - px * vz + uz * tx - ux * tz
         sz = px * vy - py * vx + ux * ty - uy * tx
-        w[DVEL_N + X + i] = vx + 0.5 * (ty * vz - tz * vy) + ratio * sx
-        w[DVEL_N + Y + i] = vy + 0.5 * (tz * vx - tx * vz) + ratio * sy
-        w[DVEL_N + Z + i] = vz + 0.5 * (tx * vy - ty * vx) + ratio * sz
+        cx, cy, cz = ty * vz - tz * vy, tz * vx - tx * vz, tx * vy - ty * vx
+        w[DVEL_N + X + i] = vx + 0.5 * cx + (ty * cz - tz * cy) / 6.0 + ratio * sx
+        w[DVEL_N + Y + i] = vy + 0.5 * cy + (tz * cx - tx * cz) / 6.0 + ratio * sy
+        w[DVEL_N + Z + i] = vz + 0.5 * cz + (tx * cy - ty * cx) / 6.0 + ratio * sz
 
 
 @kernel

@@ -40,18 +40,25 @@ def turned_to_axle(lent: Matrix, n: float, e: float) -> Matrix:
 
 @kernel
 def on_body(c: Matrix, pitch: float, yaw: float) -> Matrix:
-    """C_nv = C_nb (I + m x)', m the small rotation that takes the IMU's axes to the vehicle's."""
-    return (
-        c[0] - yaw * c[1] + pitch * c[2],
-        c[1] + yaw * c[0],
-        c[2] - pitch * c[0],
-        c[3] - yaw * c[4] + pitch * c[5],
-        c[4] + yaw * c[3],
-        c[5] - pitch * c[3],
-        c[6] - yaw * c[7] + pitch * c[8],
-        c[7] + yaw * c[6],
-        c[8] - pitch * c[6],
+    """C_nv = C_nb exp(m x)', m = (0, pitch, yaw) the small rotation that takes the IMU's axes to the vehicle's."""
+    square = pitch * pitch + yaw * yaw
+    if square == 0.0:
+        return c
+    angle = math.sqrt(square)
+    s, k = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+    cosine = 1.0 - k * square
+    out = (
+        cosine * c[0] - s * yaw * c[1] + s * pitch * c[2],
+        s * yaw * c[0] + (1.0 - k * yaw * yaw) * c[1] + k * pitch * yaw * c[2],
+        -s * pitch * c[0] + k * pitch * yaw * c[1] + (1.0 - k * pitch * pitch) * c[2],
+        cosine * c[3] - s * yaw * c[4] + s * pitch * c[5],
+        s * yaw * c[3] + (1.0 - k * yaw * yaw) * c[4] + k * pitch * yaw * c[5],
+        -s * pitch * c[3] + k * pitch * yaw * c[4] + (1.0 - k * pitch * pitch) * c[5],
+        cosine * c[6] - s * yaw * c[7] + s * pitch * c[8],
+        s * yaw * c[6] + (1.0 - k * yaw * yaw) * c[7] + k * pitch * yaw * c[8],
+        -s * pitch * c[6] + k * pitch * yaw * c[7] + (1.0 - k * pitch * pitch) * c[8],
     )
+    return out
 
 
 @kernel

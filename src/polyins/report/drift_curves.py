@@ -28,7 +28,7 @@ def drift_figure(scene: Scene) -> Figure | None:
         return None
     figure = Figure([trace for run in runs for trace in _traces(run, points_per_trace(len(runs)))])
     finish(figure, height=440)
-    figure.update_xaxes(title_text="distance travelled (m)")
+    figure.update_xaxes(title_text="distance travelled (m)", rangemode="tozero")
     figure.update_yaxes(title_text="drift rate (%)", rangemode="tozero")
     return figure
 
@@ -40,16 +40,17 @@ def _traces(run: Run, points: int) -> Iterator[Any]:
     distance, rate = run.errors.distance, drift_curve(run.errors)
     known = np.flatnonzero((distance > DRAWN_FROM * distance[-1]) & np.isfinite(rate))
     drawn = known[kept_for_display(rate[known, None], points)]
+    multiples, rates = drift_rates(run.errors, run.summary["drift"]["step_m"])
     yield Scatter(
         x=distance[drawn].astype(np.float32),
         y=rate[drawn].astype(np.float32),
-        name=_label(run),
+        # the summary of a method may be over several runs; this is one
+        name=f"{run.label} (mean {rates.mean():.2f} %)" if rates.size else run.label,
         legendgroup=run.label,
         mode="lines",
         line={"color": run.colour, "dash": run.dash, "width": 1.8},
         hovertemplate="%{y:.3f} % after %{x:.0f} m",
     )
-    multiples, rates = drift_rates(run.errors, run.summary["drift"]["step_m"])
     yield Scatter(
         x=multiples,
         y=rates,
@@ -60,8 +61,3 @@ def _traces(run: Run, points: int) -> Iterator[Any]:
         marker={"color": run.colour, "size": 6},
         hovertemplate="%{y:.3f} % after %{x:.0f} m",
     )
-
-
-def _label(run: Run) -> str:
-    rate = run.summary["drift"]["rate_percent"]
-    return run.label if rate is None else f"{run.label} (mean {rate:.2f} %)"

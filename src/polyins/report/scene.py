@@ -112,8 +112,9 @@ class Scene:
         found = [Shade(begin, end, OUTAGE, "") for begin, end in self.outages]
         for stream in self.recording.imus:
             step = np.diff(stream.time)
-            gaps = np.flatnonzero(step > max(LEAST_SILENCE, GAP * np.median(step))) if stream.name in navigators else []
-            for k in gaps:
+            if stream.name not in navigators or step.size == 0:
+                continue
+            for k in np.flatnonzero(step > max(LEAST_SILENCE, GAP * float(np.median(step)))):
                 begin, end = (float(time) - self.start for time in stream.time[[k, k + 1]])
                 if end > 0.0 and begin < self.duration:
                     found.append(Shade(begin, end, SILENCE, escape(stream.name)))

@@ -29,9 +29,7 @@ def find_target(name: str, out: Path) -> Callable[[bool, Callable[[float], None]
         near = difflib.get_close_matches(name, TARGETS, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(TARGETS)}"
         raise InputError(f"reproduce: target {name!r} is unknown; {hint}")
-    function: Callable[[bool, Callable[[float], None]], Document] = importlib.import_module(
-        f"polyins.reproduce.{name}"
-    ).reproduce
+    function: Callable[..., Document] = importlib.import_module(f"polyins.reproduce.{name}").reproduce
     return partial(function, out=out) if name in WITH_REPORTS else function
 
 

@@ -36,12 +36,15 @@ METHODS = {
     "body-wheel-ins/IMU4": "body-wheel-ins/IMU4",
     "triple-ins": "triple-ins/IMU2/IMU4",
     "multi-wheel-ins": "multi-wheel-ins",
+}
+"""What is run, by its name in the document."""
+FURTHER = {
     "wheel-ins/IMU2_radial": "wheel-ins/IMU2_radial",
     "wheel-ins/IMU4_radial": "wheel-ins/IMU4_radial",
     "dual-wheel-ins/centralized": "dual-wheel-ins/IMU2/IMU4/centralized",
     "triple-ins/centralized": "triple-ins/IMU2/IMU4/centralized",
 }
-"""What is run, by its name in the document."""
+"""IMUs off the centre of their wheels, and joined covariances."""
 
 STEERED = ("wheel-ins/IMU1", "wheel-ins/IMU3")
 """Controls: a front wheel turns with the steering, so its heading is not the car's."""
@@ -104,7 +107,8 @@ def reproduce(
         controls[number] = {name: score(solution, trial) for name, solution in run_controls(trial).items()}
         settings = _settings(trial.recording)
         if out is not None:
-            _write_report(out / f"wid-trial{number}.html", trial, solutions)
+            drawn = {name: solution for name, solution in solutions.items() if name in METHODS}
+            _write_report(out / f"wid-trial{number}.html", trial, drawn)
         if progress:
             progress(done / len(numbers))
     return {
@@ -116,7 +120,7 @@ def reproduce(
             "controls": plain(mean(controls.values())),
             "controls_by_trial": plain(controls),
         },
-        "settings": {**settings, "trials": numbers, "methods": METHODS, "quick": quick},
+        "settings": {**settings, "trials": numbers, "methods": METHODS | FURTHER, "quick": quick},
     }
 
 
@@ -151,7 +155,8 @@ def read_track(path: Path) -> Track:
 def run_all(trial: Trial) -> dict[str, Solution]:
     """Run the methods that the trial has the sensors for."""
     rig = trial.recording.rig
-    return {name: batch.run(trial.recording, label) for name, label in METHODS.items() if _possible(label, rig)}
+    wanted = METHODS | FURTHER
+    return {name: batch.run(trial.recording, label) for name, label in wanted.items() if _possible(label, rig)}
 
 
 def run_controls(trial: Trial) -> dict[str, Solution]:

@@ -1,21 +1,26 @@
 """From error-free increments to what a real IMU puts out.
 
-In the order of the sensor's physics: the triads are misaligned, then scale, bias and noise come on top,
+In the order of the sensor's physics: samples are taken a little early or late, the triads are turned and not quite
+square, force acts on what should not feel it, then scale, bias and noise come on top, and all is rounded,
 
-    measured = (1 + scale) turned(true) + bias dt + noise,
+    measured = (1 + scale) (turned(true) + force response) + bias dt + noise,
 
-so that (measured - bias dt) / (1 + scale) takes them off again. Biases and scale factors are the sum of a constant,
-drawn at turn-on, and a first-order Gauss-Markov drift.
+so that (measured - bias dt) / (1 + scale) takes bias and scale off again. Biases and scale factors are the sum of a
+constant, drawn at turn-on, and a first-order Gauss-Markov drift; biases may walk besides.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.rig import ImuErrors, NoiseGrade, Vector
+from polyins.simulation.force_response import ForceResponse, draw_force_response
+from polyins.simulation.sampling import jittered, rounded
+from polyins.simulation.shared_noise import SharedNoise, blend
+from polyins.simulation.triads import Chip, skewed, turned
 
 Array = NDArray[np.float64]
 
@@ -34,6 +39,30 @@ class Imperfections:
     noise: bool = True
     biases: bool = True
     scales: bool = True
+    chip_rotation_std: float = 0.0
+    """rad: rotation of the chip, both triads alike, about each axis"""
+    gyro_skew_std: float = 0.0
+    """rad, by which each two gyro axes are not square"""
+    accel_skew_std: float = 0.0
+    """rad"""
+    gyro_random_walk: float = 0.0
+    """of the gyro biases, rad/s/sqrt(s)"""
+    accel_random_walk: float = 0.0
+    """of the accelerometer biases, m/s^2/sqrt(s)"""
+    g_sensitivity_std: float = 0.0
+    """of each of nine elements, rad/s per m/s^2"""
+    rectification_mean: float = 0.0
+    """m/s^2 per (m/s^2)^2, of all chips and axes"""
+    rectification_std: float = 0.0
+    """about the mean, of each axis of each chip"""
+    jitter_std: float = 0.0
+    """s"""
+    gyro_lsb: float = 0.0
+    """rad/s; 0: none"""
+    accel_lsb: float = 0.0
+    """m/s^2; 0: none"""
+    chips: tuple[Chip, ...] = ()
+    """calibrations that are not made up for, one for each IMU in turn"""
 
     def limit(self, grade: NoiseGrade) -> NoiseGrade:
         """Return the grade with zeros for the errors that are switched off."""
@@ -60,6 +89,11 @@ class TrueErrors:
     """rad: rotation vector from the nominal axes to those of the gyro triad"""
     accel_misalignment: Vector
     """rad, likewise"""
+    gyro_response: Array = field(default_factory=lambda: np.eye(3))
+    """besides: what maps the true rate to the triad's axes, shape (3, 3)"""
+    accel_response: Array = field(default_factory=lambda: np.eye(3))
+    """likewise"""
+    force_response: ForceResponse = field(default_factory=ForceResponse)
 
     def at(self, time: Array) -> Array:
         """Return the twelve errors in sensor axes at times, shape (T, 12)."""
@@ -80,9 +114,18 @@ class TrueErrors:
 
 
 def draw_errors(
-    duration: float, grade: NoiseGrade, imperfections: Imperfections, rng: np.random.Generator
+    duration: float,
+    grade: NoiseGrade,
+    imperfections: Imperfections,
+    rng: np.random.Generator,
+    *,
+    shared: SharedNoise | None = None,
+    number: int = 0,
 ) -> TrueErrors:
-    """Draw the slow errors of one IMU over a duration, s, from the statistics of its grade."""
+    """Draw the slow errors of one IMU over a duration, s, from the statistics of its grade.
+
+    `shared` is what it has in common with its board; `number` counts the IMUs from 0, for their calibrations.
+    """
     limited = imperfections.limit(grade)
     std = np.concatenate(
         [limited.gyro_bias_std, limited.accel_bias_std, limited.gyro_scale_std, limited.accel_scale_std]
@@ -92,8 +135,46 @@ def draw_errors(
     constant = np.sqrt(share) * std * rng.standard_normal(12)
     step = min(DRIFT_STEP, grade.correlation_time / DRIFT_STEPS_PER_CORRELATION_TIME)
     time = np.arange(np.ceil(duration / step) + 1.0) * step
-    drift = np.sqrt(1.0 - share) * std * gauss_markov(time.size, step / grade.correlation_time, rng)
-    return TrueErrors(time, constant + drift, gyro_misalignment, accel_misalignment)
+    drift = gauss_markov(time.size, step / grade.correlation_time, rng)
+    # what follows draws from generators of its own, so that the other errors stay the same without it
+    walk_rng, chip_rng = rng.spawn(2)
+    walk = _random_walk(time.size, step, imperfections, walk_rng)
+    if shared is not None and shared.drift_share > 0.0:
+        same = gauss_markov(time.size, step / grade.correlation_time, shared.generator(0))
+        drift = blend(drift, same, shared.drift_share)
+        same_walk = _random_walk(time.size, step, imperfections, shared.generator(1))
+        walk = blend(walk, same_walk, shared.drift_share)
+    series = constant + np.sqrt(1.0 - share) * std * drift
+    series[:, :6] += walk
+    drawn = TrueErrors(time, series, gyro_misalignment, accel_misalignment)
+    return _with_chip(drawn, imperfections, chip_rng, number)
+
+
+def _random_walk(count: int, step: float, imperfections: Imperfections, rng: np.random.Generator) -> Array:
+    """Return the walks of the six biases from 0, shape (count, 6)."""
+    density = np.repeat([imperfections.gyro_random_walk, imperfections.accel_random_walk], 3)
+    steps = np.sqrt(step) * density * rng.standard_normal((count, 6))
+    steps[0] = 0.0
+    return np.cumsum(steps, axis=0)
+
+
+def _with_chip(drawn: TrueErrors, imperfections: Imperfections, rng: np.random.Generator, number: int) -> TrueErrors:
+    """Return the errors with those of the chip: its triads, its calibration, its response to force."""
+    chip_turn = turned(imperfections.chip_rotation_std * rng.standard_normal(3))
+    gyro_skew, accel_skew = rng.standard_normal((2, 3))
+    gyro_response = skewed(imperfections.gyro_skew_std * gyro_skew) @ chip_turn
+    accel_response = skewed(imperfections.accel_skew_std * accel_skew) @ chip_turn
+    series = drawn.series
+    if imperfections.chips:
+        chip = imperfections.chips[number % len(imperfections.chips)]
+        gyro_response, accel_response = chip.gyro.response @ gyro_response, chip.accel.response @ accel_response
+        series = series + np.concatenate([chip.gyro.bias, chip.accel.bias, np.zeros(6)])
+    force = draw_force_response(
+        imperfections.g_sensitivity_std, imperfections.rectification_mean, imperfections.rectification_std, rng
+    )
+    return replace(
+        drawn, series=series, gyro_response=gyro_response, accel_response=accel_response, force_response=force
+    )
 
 
 def gauss_markov(count: int, step: float, rng: np.random.Generator) -> Array:
@@ -115,24 +196,52 @@ def corrupt(
     errors: TrueErrors,
     white: NoiseGrade,
     rng: np.random.Generator,
+    *,
+    imperfections: Imperfections | None = None,
+    shared: SharedNoise | None = None,
+    vibration: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return the increments, shape (T, 3) each, in sensor axes, with the errors and with white noise of a grade.
 
-    `time` is that of the ends of the intervals, s, shape (T,), evenly spaced.
+    `time` is that of the ends of the intervals, s, shape (T,), evenly spaced. `imperfections` say how samples are
+    taken; `shared` is what the IMU has in common with its board; `vibration` is its mean square along each axis that
+    the increments do not show, (m/s^2)^2, shape (T,).
     """
     interval = float(time[1] - time[0])
+    imperfections = imperfections or Imperfections()
     gyro_bias, accel_bias, gyro_scale, accel_scale = np.split(errors.at(time - interval / 2.0), 4, axis=1)
-    gyro_noise, accel_noise = np.sqrt(interval) * rng.standard_normal((2, *dtheta.shape))
-    turned_dtheta = dtheta @ _rotation(errors.gyro_misalignment)
-    turned_dvel = dvel @ _rotation(errors.accel_misalignment)
+    noise = rng.standard_normal((2, *dtheta.shape))
+    if shared is not None and shared.white_share > 0.0:
+        noise = blend(noise, shared.generator(2).standard_normal(noise.shape), shared.white_share)
+    gyro_noise, accel_noise = np.sqrt(interval) * noise
+    if imperfections.jitter_std > 0.0:
+        jitter = imperfections.jitter_std * rng.spawn(1)[0].standard_normal(time.size)
+        dtheta, dvel = jittered(dtheta, jitter, interval), jittered(dvel, jitter, interval)
+    turned_dtheta, turned_dvel = _felt(dtheta, dvel, errors, vibration, interval)
     return (
-        (1.0 + gyro_scale) * turned_dtheta + gyro_bias * interval + gyro_noise * white.angle_random_walk,
-        (1.0 + accel_scale) * turned_dvel + accel_bias * interval + accel_noise * white.velocity_random_walk,
+        rounded(
+            (1.0 + gyro_scale) * turned_dtheta + gyro_bias * interval + gyro_noise * white.angle_random_walk,
+            imperfections.gyro_lsb,
+            interval,
+        ),
+        rounded(
+            (1.0 + accel_scale) * turned_dvel + accel_bias * interval + accel_noise * white.velocity_random_walk,
+            imperfections.accel_lsb,
+            interval,
+        ),
     )
 
 
-def _rotation(vector: Vector) -> Array:
-    """Return the matrix of a rotation vector; row vectors times it are in the turned axes."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+def _felt(
+    dtheta: Array, dvel: Array, errors: TrueErrors, vibration: Array | None, interval: float
+) -> tuple[Array, Array]:
+    """Return the increments along the axes of the triads, with what force does to them."""
+    felt_dtheta = dtheta @ turned(errors.gyro_misalignment).T @ errors.gyro_response.T
+    felt_dvel = dvel @ turned(errors.accel_misalignment).T @ errors.accel_response.T
+    response = errors.force_response
+    if np.any(response.g_sensitivity):
+        felt_dtheta = felt_dtheta + response.gyro(felt_dvel)
+    if np.any(response.rectification):
+        still = np.zeros(len(dvel)) if vibration is None else vibration
+        felt_dvel = felt_dvel + response.accel(felt_dvel, still, interval)
+    return felt_dtheta, felt_dvel

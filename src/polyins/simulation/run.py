@@ -5,7 +5,9 @@ Many recordings of one run are cheap: what error-free IMUs put out is worked out
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,11 +19,16 @@ from polyins.io.yaml_document import write_yaml
 from polyins.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.rig import DEG, Imu
 from polyins.simulation import gnss
+from polyins.simulation.flexible import flex, tip_motion
+from polyins.simulation.flexible_scenario import Road
 from polyins.simulation.ground import without_twist
 from polyins.simulation.imu_errors import TrueErrors, corrupt, draw_errors
 from polyins.simulation.increments import Increments, increments
+from polyins.simulation.moving_imu import FINE_STEPS, moving_increments, smooth_rates
 from polyins.simulation.path import Path, drive
 from polyins.simulation.rolling import RollingWheel
+from polyins.simulation.shaking import shake, shaken_path
+from polyins.simulation.shared_noise import SharedNoise
 from polyins.simulation.wheels import wheel_increments
 
 if TYPE_CHECKING:
@@ -46,9 +53,13 @@ class TrueRun:
     """in the order of the scenario's"""
     spinning: tuple[Increments, ...]
     """error-free, of the modules on the wheels"""
+    tips: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    """error-free (dtheta, dvel) of the IMUs on rulers, by name"""
 
     def sensed(self, imu: Imu) -> tuple[Array, Array]:
         """Return the error-free (dtheta, dvel) of an IMU in its own axes, shape (T, 3) each."""
+        if imu.name in self.tips:
+            return self.tips[imu.name]
         if imu.wheel is None:
             return self.body.at(imu.position, imu.rotation)
         names = [wheel.name for wheel in self.scenario.wheels]
@@ -75,19 +86,37 @@ def true_run(scenario: Scenario) -> TrueRun:
     Raises InputError for a scenario that cannot be.
     """
     seed = scenario.seed if scenario.path_seed is None else scenario.path_seed
-    drive_seed, _, _, wheel_seed = np.random.SeedSequence(seed).spawn(4)
+    drive_seed, _, _, wheel_seed, ground_seed = np.random.SeedSequence(seed).spawn(5)
     path = _path(scenario, drive_seed)
     wheels = tuple(
         wheel.rolls(path, np.random.default_rng(own_seed))
         for wheel, own_seed in zip(scenario.wheels, wheel_seed.spawn(len(scenario.wheels)), strict=True)
     )
-    return TrueRun(
+    run = TrueRun(
         scenario.model_copy(update={"path_seed": seed, "duration_s": path.duration}),
         path,
         increments(path, scenario.rate_hz),
         wheels,
         tuple(wheel_increments(wheel, scenario.rate_hz) for wheel in wheels),
     )
+    return _on_rulers(run, np.random.default_rng(ground_seed)) if scenario.rulers else run
+
+
+def _on_rulers(run: TrueRun, rng: np.random.Generator) -> TrueRun:
+    """Return a run whose body shakes on its road, and whose IMUs are at the tips of rulers."""
+    scenario, path, interval = run.scenario, run.path, run.body.interval
+    assert scenario.rulers is not None
+    rulers = scenario.rulers.rulers(rng)
+    road = scenario.road or Road()
+    begins = scenario.shuttle.straights(path.duration, scenario.static_s)[1] if scenario.shuttle else ()
+    shaking = shake(path, road.ground(path, begins, rng), road.suspension(), interval / FINE_STEPS)
+    smooth = smooth_rates(path, len(run.body.time), interval)
+    gravity = float(path.world.gravity(path.position(np.zeros(1)))[0])
+    tips = {}
+    for imu, ruler in zip(scenario.rig().imus, rulers, strict=True):
+        flexing = flex(ruler, shaking, gravity)
+        tips[imu.name] = moving_increments(smooth, partial(tip_motion, ruler, flexing, shaking), interval)
+    return replace(run, path=shaken_path(path, shaking), tips=tips)
 
 
 def record(run: TrueRun, *, seed: int) -> Simulation:
@@ -97,11 +126,12 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
     """
     own_path = run.scenario.path_seed if run.scenario.path_seed != seed else None
     scenario = run.scenario.model_copy(update={"seed": checked(seed), "path_seed": own_path})
-    _, gnss_seed, imu_seed, _ = np.random.SeedSequence(seed).spawn(4)
+    _, gnss_seed, imu_seed, _, board_seed = np.random.SeedSequence(seed).spawn(5)
     rig = scenario.rig()
+    shared = scenario.errors.shared(int(board_seed.generate_state(1)[0]))
     sensed = [
-        _sense(imu, run, np.random.default_rng(own_seed))
-        for imu, own_seed in zip(rig.imus, imu_seed.spawn(len(rig.imus)), strict=True)
+        _sense(number, imu, run, shared, np.random.default_rng(own_seed))
+        for number, (imu, own_seed) in enumerate(zip(rig.imus, imu_seed.spawn(len(rig.imus)), strict=True))
     ]
     imus, streams, errors = zip(*sensed, strict=True)
     too_short = bool(scenario.gnss and scenario.outages) and not scenario.outage_intervals()
@@ -134,6 +164,8 @@ def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
     if scenario.track:
         path = scenario.track.path(scenario.static_s, start, world)
         return replace(path, duration=min(path.duration, scenario.duration_s))
+    if scenario.shuttle:
+        return scenario.shuttle.path(scenario.duration_s, scenario.static_s, start, world)
     path = drive(
         scenario.duration_s,
         static=scenario.static_s,
@@ -145,13 +177,25 @@ def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
     return without_twist(path) if scenario.wheels else path
 
 
-def _sense(imu: Imu, run: TrueRun, rng: np.random.Generator) -> tuple[Imu, ImuStream, TrueErrors]:
+def _sense(
+    number: int, imu: Imu, run: TrueRun, shared: SharedNoise, rng: np.random.Generator
+) -> tuple[Imu, ImuStream, TrueErrors]:
     """Return an IMU as it is configured, what it puts out, turned into array axes as a reader does, and its errors."""
     scenario, time = run.scenario, run.body.time
     imperfections, grade = scenario.errors.imperfections(), noise_grade(scenario.noise)
     dtheta, dvel = run.sensed(imu)
-    errors = draw_errors(time[-1], grade, imperfections, rng)
-    dtheta, dvel = corrupt(time, dtheta, dvel, errors, imperfections.limit(grade), rng)
+    errors = draw_errors(time[-1], grade, imperfections, rng, shared=shared, number=number)
+    dtheta, dvel = corrupt(
+        time,
+        dtheta,
+        dvel,
+        errors,
+        imperfections.limit(grade),
+        rng,
+        imperfections=imperfections,
+        shared=shared,
+        vibration=scenario.errors.vibration(run.path.speed(time)),
+    )
     stream = ImuStream(imu.name, time, dtheta @ imu.rotation.T, dvel @ imu.rotation.T)
     return _calibrated(imu, scenario, errors), stream, errors
 

@@ -12,7 +12,6 @@ from pydantic import Field, model_validator
 from polyins.config import (
     Noise,
     NotNegative,
-    Number,
     Outages,
     OutageSchedule,
     Positive,
@@ -29,7 +28,8 @@ from polyins.io.yaml_document import read_yaml
 from polyins.recording import FilterOptions, Recording
 from polyins.rig import DEG, Imu, Rig
 from polyins.simulation import earth
-from polyins.simulation.imu_errors import Imperfections
+from polyins.simulation.error_scenario import Errors as Errors
+from polyins.simulation.flexible_scenario import Road, Rulers, Shuttle
 from polyins.simulation.path import START, TOP_SPEED, World
 from polyins.simulation.plane import Plane
 from polyins.simulation.run import Simulation, checked, record, true_run
@@ -39,6 +39,9 @@ Array = NDArray[np.float64]
 
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Count = Annotated[int, Field(ge=1, strict=True)]
+
+LARGEST_JITTER = 0.1
+"""over the interval: ten sigma still stay within one"""
 
 
 class Board(Section):
@@ -64,26 +67,6 @@ class Board(Section):
     def rotation(self, index: int) -> Array:
         """Return C_ab of an IMU, shape (3, 3)."""
         return axes_matrix(self.mounts[index % len(self.mounts)])
-
-
-class Errors(Section):
-    """Which errors the IMUs have, beyond the statistics under `noise`."""
-
-    noise: bool = True
-    """white noise"""
-    biases: bool = True
-    """biases"""
-    scales: bool = True
-    """scale factor errors"""
-    turn_on_share: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.0
-    """share of the variance of biases and scale factors that is constant; the rest drifts"""
-    misalignment_deg: NotNegative = 0.0
-    """std of the rotation of gyro and accelerometer triads about each axis, deg"""
-
-    def imperfections(self) -> Imperfections:
-        """Return the same in SI."""
-        std = self.misalignment_deg * DEG
-        return Imperfections(self.turn_on_share, std, self.noise, self.biases, self.scales)
 
 
 class Lies(Section):
@@ -135,10 +118,16 @@ class Scenario(Section):
     """of the drive, m/s; a robot's is about 2"""
     track: Track | None = None
     """a surveyed track instead of a drive"""
+    shuttle: Shuttle | None = None
+    """to and fro on straights instead of a drive"""
     rate_hz: Positive = 200.0
     """of the IMUs"""
     imus: Board = Board()
     """how many and where"""
+    rulers: Rulers | None = None
+    """flexible mounts instead of the board under imus"""
+    road: Road | None = None
+    """the ground that shakes the rulers; without it they are at rest"""
     wheels: tuple[WheelModule, ...] = ()
     """the modules on wheels; with them the drive is over ground that does not twist, so that no wheel skids"""
     noise: Noise = Field(default_factory=lambda: Noise.model_validate("consumer-mems"))
@@ -163,6 +152,8 @@ class Scenario(Section):
             raise ValueError(f"rate_hz is {self.rate_hz:g}; expected at least two samples {inside[9:]}")
         if self.gnss and self.gnss.phase_s >= self.duration_s:
             raise ValueError(f"gnss.phase_s is {self.gnss.phase_s:g}; {inside}")
+        if self.errors.jitter_s * self.rate_hz > LARGEST_JITTER:
+            raise ValueError(f"errors.jitter_s is {self.errors.jitter_s:g}; expected at most a tenth of 1 / rate_hz")
         for begin, end in self.outage_intervals():
             if not 0.0 <= begin < end <= self.duration_s:
                 raise ValueError(f"outages: [{begin:g}, {end:g}]; expected [from, to] {inside[9:]}")
@@ -173,6 +164,18 @@ class Scenario(Section):
         if self.start is not None and self.start.geodetic != (self.earth == "turning"):
             wanted = "latitude_deg and longitude_deg" if self.earth == "turning" else "north_m and east_m"
             raise blame("start", f"expected {wanted} where earth is {self.earth}")
+        return self
+
+    @model_validator(mode="after")
+    def _mounts_and_ground_fit(self) -> Self:
+        if self.shuttle and self.track:
+            raise blame("shuttle", "is given with a track; expected one of them")
+        if self.rulers and self.wheels:
+            raise blame("rulers", "are given with wheels; expected one of them")
+        if self.road and not self.rulers:
+            raise blame("road", "is given without rulers; expected both or none")
+        if self.road and self.road.books and not self.shuttle:
+            raise blame("road.books", "lie on the straights of a shuttle; expected one")
         return self
 
     @model_validator(mode="after")
@@ -201,10 +204,13 @@ class Scenario(Section):
         grade = noise_grade(self.filter_noise or self.noise)
         name = "body" if self.wheels else "imu"
         module = "body" if self.wheels and self.imus.pitch_m == 0.0 else ""
-        imus = [
-            Imu(f"{name}{index + 1}", grade, self.imus.rotation(index), position, module=module)
-            for index, position in enumerate(self.imus.positions())
-        ]
+        if self.rulers:
+            imus = [Imu(f"imu{k}", grade, position=ruler.nominal) for k, ruler in enumerate(self.rulers.rulers(), 1)]
+        else:
+            imus = [
+                Imu(f"{name}{index + 1}", grade, self.imus.rotation(index), position, module=module)
+                for index, position in enumerate(self.imus.positions())
+            ]
         imus += [imu for wheel in self.wheels for imu in wheel.imus(grade)]
         return Rig(tuple(imus), np.array(self.gnss.antenna_position_m if self.gnss else (0.0, 0.0, 0.0)))
 
@@ -217,10 +223,7 @@ class Scenario(Section):
             return ()
         if not isinstance(self.outages, OutageSchedule):
             return self.outages
-        length, every, after = self.outages.length_s, self.outages.every_s, self.outages.first_after_s
-        first = self.static_s + (every - length if after is None else after)
-        begins = np.arange(first, self.duration_s - length, every)
-        return tuple((float(begin), float(begin + length)) for begin in begins)
+        return self.outages.intervals(self.static_s, self.duration_s)
 
 
 def demo() -> Scenario:

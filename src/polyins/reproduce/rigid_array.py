@@ -1,0 +1,136 @@
+"""A simulated rigid array on the real track of paper A's Group 1, and how far it drifts in the outages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins import batch, datasets
+from polyins.errors import InputError
+from polyins.evaluation.errors import compare_to_reference
+from polyins.evaluation.outages import outage_statistic
+from polyins.recording import Recording
+from polyins.rig import DEG, PPM, ImuErrors
+from polyins.reproduce.chips import Chips, compensate, draw_chips, read_chips
+from polyins.simulation.error_scenario import Errors
+from polyins.simulation.increments import increments
+from polyins.simulation.path import Path
+from polyins.simulation.replay import replay
+from polyins.simulation.run import TrueRun, record, true_run
+from polyins.simulation.scenario import Scenario, read_scenario
+
+Array = NDArray[np.float64]
+
+DATASET = "whu-array"
+FIRST, LAST = 270769.0, 273689.0
+"""s of week: 60 s before the car first moves, and the end of the last outage"""
+QUICK_S = 600.0
+QUICK_RATE_HZ = 50.0
+STANDS_IN = f"the data set {DATASET} is not at hand: a simulated drive and chips drawn from its statistics stand in"
+
+INITIAL_STD = ImuErrors(
+    gyro_bias=np.full(3, 50.0 / 3600.0 * DEG),
+    accel_bias=np.full(3, 0.1),
+    gyro_scale=np.full(3, 2000.0 * PPM),
+    accel_scale=np.full(3, 1000.0 * PPM),
+)
+"""What the filter is told of uncompensated chips at the start: the spread of Group 1's; gyro biases are estimated at
+standstill."""
+
+
+def base_scenario(quick: bool) -> Scenario:
+    """Return the scenario of the file, shorter and slower if `quick`."""
+    with resources.as_file(resources.files("polyins.reproduce") / "a3.yaml") as file:
+        scenario = read_scenario(file)
+    return scenario.model_copy(update={"duration_s": QUICK_S, "rate_hz": QUICK_RATE_HZ}) if quick else scenario
+
+
+def real_chips() -> Chips | None:
+    """Return Group 1's chips, or None where the data set is not at hand."""
+    try:
+        return read_chips(datasets.fetch(DATASET))
+    except InputError:
+        return None
+
+
+def real_path(duration: float) -> Path | None:
+    """Return the first seconds of the replayed track, or None where the data set is not at hand."""
+    try:
+        folder = datasets.fetch(DATASET)
+    except InputError:
+        return None
+    rows = np.loadtxt(folder / "gnss_group1.txt")
+    rows = rows[(rows[:, 0] >= FIRST) & (rows[:, 0] <= min(FIRST + duration, LAST))]
+    position = np.column_stack([rows[:, 1:3] * DEG, rows[:, 3]])
+    return replay(rows[:, 0], position, rows[:, 4:7])
+
+
+def drive(scenario: Scenario) -> TrueRun:
+    """Return the truth on the real track, or on a simulated drive where the data set is not at hand."""
+    path = real_path(scenario.duration_s)
+    if path is None:
+        return true_run(scenario)
+    fitted = scenario.model_copy(update={"duration_s": path.duration, "path_seed": scenario.seed})
+    return TrueRun(fitted, path, increments(path, fitted.rate_hz), (), ())
+
+
+def with_errors(run: TrueRun, errors: Errors) -> TrueRun:
+    """Return the run with other errors."""
+    return replace(run, scenario=run.scenario.model_copy(update={"errors": errors}))
+
+
+def group_chips(number: int, count: int) -> Chips:
+    """Return the chips of a group, counted from 1: the real ones of Group 1 if at hand, else drawn ones."""
+    real = real_chips() if number == 1 else None
+    return real or draw_chips(count, np.random.default_rng([number, 20602]))
+
+
+def recording_of(run: TrueRun, seed: int, initial_std: ImuErrors | None = INITIAL_STD) -> Recording:
+    """Return a recording whose filter knows how far chips may be off at the start."""
+    recording = record(run, seed=seed).recording
+    imus = tuple(replace(imu, initial_std=initial_std) for imu in recording.rig.imus)
+    return replace(recording, rig=replace(recording.rig, imus=imus))
+
+
+def compensated(recording: Recording, chips: Chips) -> Recording:
+    """Return the recording with every chip's calibration applied."""
+    imus = tuple(replace(imu, initial_std=None) for imu in recording.rig.imus)
+    streams = tuple(compensate(stream, chip) for stream, chip in zip(recording.imus, chips, strict=True))
+    return replace(recording, rig=replace(recording.rig, imus=imus), imus=streams)
+
+
+def maxima(recording: Recording, method: str, *, imu: int = 0) -> Array:
+    """Return the maximum horizontal error in each outage, m."""
+    solution = batch.run(recording, method, imu=imu)
+    assert recording.reference is not None
+    errors = compare_to_reference(solution, recording.reference)
+    each = outage_statistic(errors, recording.outages)["each_m"]
+    return np.array(each, dtype=float)
+
+
+def figures(
+    recording: Recording, methods: Sequence[str], progress: Callable[[float], None] | None = None
+) -> dict[str, float]:
+    """Return each method's rms of the maxima, m; of `single` over all IMUs."""
+    count = len(recording.imus)
+    total = count + len(methods)
+    every = []
+    for i in range(count):
+        every.append(maxima(recording, "single", imu=i))
+        if progress:
+            progress((i + 1) / total)
+    result = {"single": rms(np.array(every))}
+    for k, method in enumerate(methods, count + 1):
+        result[method] = rms(maxima(recording, method))
+        if progress:
+            progress(k / total)
+    return result
+
+
+def rms(values: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))

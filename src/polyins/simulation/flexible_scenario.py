@@ -1,0 +1,182 @@
+"""What a scenario may say of IMUs on steel rulers, and of the ground that shakes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from polyins.config import NotNegative, Number, Positive, Section, Triple
+from polyins.rig import DEG
+from polyins.simulation.cantilever import Cantilever
+from polyins.simulation.flexible import Ruler
+from polyins.simulation.path import Path, World
+from polyins.simulation.road import Bump, Ground, Roughness, ground
+from polyins.simulation.shaking import Suspension, way
+from polyins.simulation.shuttle import shuttle_path, straights
+
+Array = NDArray[np.float64]
+
+
+class Shuttle(Section):
+    """To and fro on level ground at one speed."""
+
+    speed_m_s: Positive = 1.2
+    """m/s"""
+    straight_m: Positive = 36.0
+    """length of each straight, m"""
+    turn_radius_m: Positive = 1.5
+    """of the half turns between them, m"""
+    heading_deg: Number = 0.0
+    """of the first straight, deg"""
+
+    def path(self, duration: float, static: float, start: ArrayLike, world: World) -> Path:
+        """Return the path."""
+        return shuttle_path(
+            duration,
+            self.speed_m_s,
+            self.straight_m,
+            self.turn_radius_m,
+            static=static,
+            start=start,
+            heading=self.heading_deg * DEG,
+            world=world,
+        )
+
+    def straights(self, duration: float, static: float) -> tuple[Array, Array]:
+        """Return when the straights begin, s, and after which way, m."""
+        return straights(duration, self.speed_m_s, self.straight_m, self.turn_radius_m, static)
+
+
+class Arm(Section):
+    """One ruler with an IMU at its tip. It lies across the robot."""
+
+    tip_m: Triple
+    """its tip if it were straight, from the array origin: forward, right, down, m; it points away from the middle"""
+    free_length_m: Positive
+    """from the clamp to the tip, m"""
+
+
+class Rulers(Section):
+    """IMUs at the tips of steel rulers."""
+
+    arms: Annotated[tuple[Arm, ...], Field(min_length=1)]
+    """one for each IMU"""
+    width_m: Positive = 0.03
+    """of the rulers, m"""
+    thickness_m: Positive = 0.001
+    """of the rulers, m"""
+    young_gpa: Positive = 200.0
+    """Young's modulus, GPa; steel"""
+    density_kg_m3: Positive = 7850.0
+    """kg/m^3; steel"""
+    tip_mass_kg: Positive = 0.015
+    """of a module with its share of the cable, kg"""
+    module_height_m: NotNegative = 0.008
+    """of the module's mass above the ruler, m"""
+    module_width_m: Positive = 0.02
+    """m"""
+    damping: Positive = 0.02
+    """ratio, of bending and torsion"""
+    damping_spread: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.3
+    """by which share, at most, the damping of a ruler differs, drawn evenly"""
+    tuning_spread: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.03
+    """by which share, at most, its natural frequencies do: clamps are not ideal"""
+    stiff: bool = False
+    """the rulers neither bend nor twist: a rigid array of the same geometry"""
+
+    def rulers(self, rng: np.random.Generator | None = None) -> list[Ruler]:
+        """Return the rulers; without a generator as they are meant to be."""
+        drawn = rng.uniform(-1.0, 1.0, (2, len(self.arms))) if rng else np.zeros((2, len(self.arms)))
+        return [
+            Ruler(
+                self.beam(arm.free_length_m),
+                np.array(arm.tip_m),
+                float(np.sign(arm.tip_m[1]) or 1.0),
+                tuning=1.0 + self.tuning_spread * float(tuning),
+                damping=self.damping * (1.0 + self.damping_spread * float(damping)),
+                stiff=self.stiff,
+            )
+            for arm, tuning, damping in zip(self.arms, *drawn, strict=True)
+        ]
+
+    def beam(self, length: float) -> Cantilever:
+        """Return a ruler of a free length, m."""
+        return Cantilever(
+            length,
+            self.width_m,
+            self.thickness_m,
+            self.tip_mass_kg,
+            self.module_height_m,
+            self.module_width_m,
+            young=self.young_gpa * 1e9,
+            density=self.density_kg_m3,
+        )
+
+
+class Book(Section):
+    """Something flat that lies in the way on every straight."""
+
+    at_m: NotNegative
+    """where it begins, m along the straight"""
+    height_m: Positive
+    """m"""
+    length_m: Positive = 0.2
+    """along the way, m"""
+    under: Literal["left", "right", "both"] = "both"
+    """which wheels roll over it"""
+
+
+class Road(Section):
+    """The ground, and the robot that rolls over it."""
+
+    roughness_mm: NotNegative = 0.0
+    """rms height of the ground, mm"""
+    wavelengths_m: tuple[Positive, Positive] = (0.1, 3.0)
+    """the shortest and the longest, m"""
+    correlation: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.5
+    """of the ground under left and right wheels"""
+    patch_length_m: Positive = 4.0
+    """over which the roughness keeps its size, m"""
+    patch_sigma: NotNegative = 0.4
+    """std of the logarithm of that size"""
+    books: tuple[Book, ...] = ()
+    """on every straight"""
+    wheelbase_m: Positive = 0.45
+    """m"""
+    track_m: Positive = 0.40
+    """from left to right wheels, m"""
+    centre_m: Triple = (0.0, 0.0, 0.0)
+    """between the four wheels, from the array origin, m"""
+    heave_hz: Positive = 12.0
+    """natural frequency of the body on its tyres, Hz"""
+    pitch_hz: Positive = 13.0
+    """Hz"""
+    roll_hz: Positive = 12.5
+    """Hz"""
+    damping: Positive = 0.2
+    """ratio, of all three"""
+    envelope_m: NotNegative = 0.08
+    """length over which a tyre averages the ground, m"""
+
+    def suspension(self) -> Suspension:
+        """Return the robot's body on its wheels."""
+        rates = 2.0 * np.pi * np.array([self.heave_hz, self.pitch_hz, self.roll_hz])
+        return Suspension(self.wheelbase_m, self.track_m, np.array(self.centre_m), rates, self.damping)
+
+    def ground(self, path: Path, straight_begins: Sequence[float] | Array, rng: np.random.Generator) -> Ground:
+        """Draw the ground along a path whose straights begin after the given ways, m."""
+        shortest, longest = self.wavelengths_m
+        roughness = Roughness(
+            self.roughness_mm * 1e-3, shortest, longest, self.correlation, self.patch_length_m, self.patch_sigma
+        )
+        bumps = [
+            Bump(begin + book.at_m, book.length_m, book.height_m, book.under != "right", book.under != "left")
+            for begin in straight_begins
+            for book in self.books
+        ]
+        length = float(way(path, np.linspace(0.0, path.duration, int(path.duration * 100.0) + 1))[-1])
+        return ground(length, roughness, bumps, self.envelope_m, rng)

@@ -1,0 +1,104 @@
+"""Rough ground under two wheel tracks, and books lying on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+Array = NDArray[np.float64]
+
+STEP = 0.01  # m between the points of a profile
+MARGIN = 2.0  # m before and beyond the way travelled
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """Random ground whose power spectral density falls with the second power of the wave number."""
+
+    rms: float
+    """m"""
+    shortest: float
+    """wavelength, m"""
+    longest: float
+    """wavelength, m"""
+    correlation: float
+    """of the two tracks"""
+    patch_length: float
+    """m, over which the roughness keeps its size"""
+    patch_sigma: float
+    """std of the logarithm of that size"""
+
+
+@dataclass(frozen=True)
+class Bump:
+    """A book."""
+
+    begin: float
+    """m along the way"""
+    length: float
+    """m"""
+    height: float
+    """m"""
+    left: bool
+    """under the left wheels"""
+    right: bool
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Heights of the ground that the left and the right wheels follow, smoothed by the tyres."""
+
+    heights: CubicSpline
+    """m upwards, over m along the way: (T,) -> (T, 2)"""
+
+    def __call__(self, along: Array) -> Array:
+        """Return the heights under left and right wheels at places along the way, m, shape (T, 2)."""
+        return np.asarray(self.heights(along))
+
+
+def ground(
+    length: float, roughness: Roughness, bumps: Sequence[Bump], envelope: float, rng: np.random.Generator
+) -> Ground:
+    """Draw the ground along a way of a length, m; tyres average it over `envelope`, m."""
+    from scipy.interpolate import CubicSpline
+    from scipy.ndimage import uniform_filter1d
+
+    along = np.arange(-MARGIN, length + MARGIN, STEP)
+    common, left, right = (_rough(along.size, roughness, rng) for _ in range(3))
+    share = roughness.correlation
+    heights = np.sqrt(share) * common[:, None] + np.sqrt(1.0 - share) * np.column_stack([left, right])
+    heights = heights * (roughness.rms * _patches(along.size, roughness, rng))[:, None]
+    for bump in bumps:
+        under = (along >= bump.begin) & (along < bump.begin + bump.length)
+        heights[under] += bump.height * np.array([bump.left, bump.right])
+    heights = uniform_filter1d(heights, max(1, round(envelope / STEP)), axis=0, mode="nearest")
+    return Ground(CubicSpline(along, heights))
+
+
+def _rough(count: int, roughness: Roughness, rng: np.random.Generator) -> Array:
+    """Return a random profile of unit rms with wavelengths in the band, shape (count,)."""
+    wave = np.fft.rfftfreq(count, STEP)
+    inside = (wave >= 1.0 / roughness.longest) & (wave <= 1.0 / roughness.shortest)
+    amplitude = np.where(inside, 1.0 / np.maximum(wave, 1.0 / roughness.longest), 0.0)
+    drawn = rng.standard_normal(wave.size) + 1j * rng.standard_normal(wave.size)
+    # the mean square of the profile that these amplitudes have in expectation
+    power = 4.0 * np.sum(amplitude**2) / count**2
+    return np.asarray(np.fft.irfft(amplitude * drawn, count) / np.sqrt(power))
+
+
+def _patches(count: int, roughness: Roughness, rng: np.random.Generator) -> Array:
+    """Return the local size of the roughness, log-normal, of unit mean square, shape (count,)."""
+    from scipy.ndimage import gaussian_filter1d
+
+    width = roughness.patch_length / STEP / 2.0
+    smooth = gaussian_filter1d(rng.standard_normal(count), width, mode="wrap")
+    # the filter's gain: the integral of a squared Gaussian
+    smooth *= np.sqrt(2.0 * np.sqrt(np.pi) * width)
+    return np.asarray(np.exp(roughness.patch_sigma * smooth - roughness.patch_sigma**2))

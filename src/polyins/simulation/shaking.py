@@ -1,0 +1,144 @@
+"""A robot's body on its tyres: the ground under four wheels heaves, pitches and rolls it about its path.
+
+Each of the three is a mass on a spring and a damper whose foot is the plane through the wheels. The robot drives along
+a smooth path p; the body b is displaced from it by the heave along p's z axis and turned by pitch, then roll.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.simulation.path import Motion, Path
+from polyins.simulation.road import Ground
+from polyins.simulation.transmission import transmit
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Suspension:
+    """Four wheels and the springs between them and the body."""
+
+    wheelbase: float
+    """m"""
+    track: float
+    """m"""
+    centre: Array
+    """between the wheels, in the array frame, m, shape (3,)"""
+    rates: Array
+    """natural frequencies of heave, pitch, roll, rad/s, shape (3,)"""
+    damping: float
+    """ratio, of all three"""
+
+
+@dataclass(frozen=True)
+class Shaking:
+    """How the body moves about its path, every `step` s from time 0."""
+
+    step: float
+    """s"""
+    motion: Array
+    """heave of the array origin, m, downwards; pitch and roll, rad; shape (T, 3)"""
+    change: Array
+    """its derivative, shape (T, 3)"""
+
+    def curve(self) -> CubicHermiteSpline:
+        """Return the motion as a function of time."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        time = self.step * np.arange(len(self.motion))
+        return CubicHermiteSpline(time, self.motion, self.change, axis=0)
+
+
+def shake(path: Path, ground: Ground, suspension: Suspension, step: float) -> Shaking:
+    """Return what the ground does to the body of a robot that drives over it along a path."""
+    time = step * np.arange(int(np.ceil(path.duration / step)) + 1)
+    along = way(path, time)
+    half = suspension.wheelbase / 2.0
+    front, rear = ground(along + half), ground(along - half)
+    feet = np.column_stack(
+        [
+            -(front + rear).mean(axis=1) / 2.0,
+            (front - rear).mean(axis=1) / suspension.wheelbase,
+            (front + rear) @ [0.5, -0.5] / suspension.track,
+        ]
+    )
+    moved = [
+        transmit(foot, step, rate, suspension.damping) for foot, rate in zip(feet.T, suspension.rates, strict=True)
+    ]
+    motion, change = (np.column_stack(columns) for columns in zip(*moved, strict=True))
+    for values in (motion, change):
+        # from the middle between the wheels to the array origin
+        values[:, 0] += suspension.centre[0] * values[:, 1] - suspension.centre[1] * values[:, 2]
+    return Shaking(step, motion, change)
+
+
+def way(path: Path, time: Array) -> Array:
+    """Return the way travelled at evenly spaced times from 0, m, shape (T,)."""
+    speed = path.speed(time)
+    return np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2.0) * (time[1] - time[0]))
+
+
+@dataclass(frozen=True)
+class ShakenPath(Path):
+    """A path whose body shakes: `motion` and `truth` are those of the body."""
+
+    shaking: CubicHermiteSpline | None = None
+    """heave, pitch, roll"""
+
+    def motion(self, time: Array) -> Motion:
+        """Return position, velocity, attitude and rates of the array origin at times, shape (T,)."""
+        smooth = super().motion(time)
+        assert self.shaking is not None
+        heave, pitch, roll = self.shaking(time).T
+        rise, pitching, rolling = self.shaking(time, 1).T
+        none = np.zeros_like(heave)
+        C_pb = rotation_matrices_of(roll, pitch)
+        C_nb = smooth.C_nb @ C_pb
+        offset = np.column_stack([none, none, heave])
+        relative = smooth.angular_rate - smooth.earth_rate
+        moving = np.cross(relative, offset) + np.column_stack([none, none, rise])
+        shift, velocity = ((smooth.C_nb @ vector[..., None])[..., 0] for vector in (offset, moving))
+        own = np.column_stack([rolling, pitching * np.cos(roll), -pitching * np.sin(roll)])
+        return Motion(
+            smooth.position + self.world.displacement(smooth.position, shift),
+            smooth.velocity + velocity,
+            _euler(C_nb, smooth.attitude[:, 2]),
+            C_nb,
+            to_frame(C_pb, smooth.earth_rate),
+            to_frame(C_pb, smooth.angular_rate) + own,
+        )
+
+
+def shaken_path(path: Path, shaking: Shaking) -> ShakenPath:
+    """Return the path of the body of a robot that shakes about a smooth path."""
+    return ShakenPath(
+        path.duration, path.static, path.speed, path.roll, path.pitch, path.heading, path.position, path.world,
+        shaking.curve(),
+    )  # fmt: skip
+
+
+def rotation_matrices_of(roll: Array, pitch: Array) -> Array:
+    """Return Ry(pitch) Rx(roll), shape (T, 3, 3)."""
+    (sr, sp), (cr, cp) = np.sin([roll, pitch]), np.cos([roll, pitch])
+    none = np.zeros_like(sr)
+    return np.stack([cp, sp * sr, sp * cr, none, cr, -sr, -sp, cp * sr, cp * cr], axis=-1).reshape(-1, 3, 3)
+
+
+def to_frame(C: Array, vector: Array) -> Array:
+    """Return C' v of matrices, shape (T, 3, 3), and vectors, shape (T, 3)."""
+    return np.asarray(np.einsum("tji,tj->ti", C, vector))
+
+
+def _euler(C_nb: Array, near: Array) -> Array:
+    """Return roll, pitch, heading of matrices, rad; the heading is the one next to `near`."""
+    heading = np.arctan2(C_nb[:, 1, 0], C_nb[:, 0, 0])
+    heading += 2.0 * np.pi * np.rint((near - heading) / (2.0 * np.pi))
+    return np.column_stack([np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]), -np.arcsin(C_nb[:, 2, 0]), heading])
