@@ -19,6 +19,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -36,7 +37,7 @@ from polyins.config import columns
 from polyins.io.yaml_document import read_yaml
 from polyins.recording import GnssStream, ImuStream, Reference
 from polyins.simulation import scenario
-from polyins.simulation.wheel_scenario import WheelModule
+from polyins.simulation.wheel_scenario import Slip, Track, WheelModule
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PAGES = [REPOSITORY / "README.md", REPOSITORY / "CHANGELOG.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
@@ -181,12 +182,14 @@ def _at_hand(dataset: str) -> bool:
 def run(words: list[str], block: Block) -> None:
     """Run a command as the shell would, in this process; `>` sends its output to a file."""
     words = [os.path.expandvars(word) for word in words]
+    target = None
     if ">" in words:
-        words = words[: words.index(">")]
+        words, (_, target) = words[: words.index(">")], words[words.index(">") :]
     if block.mark.startswith("help"):
         words = [*words, "--help"]
     try:
-        cli.cli.main(words, prog_name="polyins", standalone_mode=False)
+        with Path(target or os.devnull).open("w") as file, redirect_stdout(file) if target else nullcontext():
+            cli.cli.main(words, prog_name="polyins", standalone_mode=False)
     except click.exceptions.Exit as stopped:  # after --help
         if stopped.exit_code:
             pytest.fail(f"{block}: polyins {shlex.join(words)}: exit code {stopped.exit_code}")
@@ -431,6 +434,9 @@ SCENARIO: dict[str, type[BaseModel]] = {
     "errors": scenario.Errors,
     "gnss of a scenario": scenario.Fixes,
     "gnss.lies": scenario.Lies,
+    "wheels[]": WheelModule,
+    "wheels[].slip": Slip,
+    "track": Track,
 }
 KINDS = (
     (config.Outages, "mapping or list of two numbers each"),

@@ -345,6 +345,14 @@ class _RollingSearch(_Search):
 
     imu_attitudes: Array
 
+    def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
+        if self.options.velocity is None and still is None:
+            raise InputError(
+                "start: no standstill of three seconds; a vehicle with wheels starts at one:"
+                " expected start.static_interval_s, or start.velocity_m_s and start.roll_pitch_deg"
+            )
+        return super()._velocity(time, still)
+
     def run(self) -> Start:
         start = super().run()
         return replace(start, imu_attitudes=self.imu_attitudes)

@@ -193,6 +193,8 @@ def _prepare_rolling(
     groups = np.zeros((len(spans) + 1, share.SIZE))
     for g, (first, last) in zip(groups, spans, strict=False):
         g[share.WEIGHTS] = last - first
+        for lane in range(first, last):
+            blocks[lane // LANES, bank.WEIGHT + lane % LANES] = 1.0
         _fill_share(g, members[first:last], start, recording.rig)
         for k, std in enumerate(modules.mounting_std(members[first].imu, speed)):
             g[share.P + (share.INERTIAL + k) * (share.STRIDE + 1)] = std**2

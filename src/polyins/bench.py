@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polyins import batch
 from polyins.recording import Recording
@@ -16,7 +17,9 @@ from polyins.recording import Recording
 ROUNDS = 9
 SECONDS = 120.0
 
-CASES = (
+Case = tuple[str, str, int, bool]
+
+CASES: tuple[Case, ...] = (
     ("dense/single", "single", 1, True),
     ("single", "single", 1, False),
     ("imu-fusion/16", "imu-fusion", 16, False),
@@ -42,22 +45,10 @@ def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     The cases take turns, and each ratio is the median of those within a round, so that a change in the machine's
     speed does not enter.
     """
-    recordings = {count: array(count) if count else vehicle() for count in sorted({case[2] for case in CASES})}
-    cost = np.empty((ROUNDS, len(CASES)))
-    for k in range(-1, ROUNDS):  # a first round warms up
-        for j, (_, method, count, dense) in enumerate(CASES):
-            solution = batch.run(recordings[count], method, dense_covariance=dense)
-            cost[k, j] = 1e6 * solution.filter_s / len(solution.time)
-        if progress:
-            progress((k + 2) / (ROUNDS + 1))
+    cost = measure(CASES, ROUNDS, SECONDS, progress)
     ratios = np.median(cost / cost[:, :1], axis=0)
     return {
-        "machine": {
-            "processor": _processor(),
-            "cores": os.cpu_count(),
-            "system": platform.platform(),
-            "python": platform.python_version(),
-        },
+        "machine": machine(),
         "results": [
             {
                 "name": name,
@@ -72,17 +63,43 @@ def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     }
 
 
-def array(count: int) -> Recording:
+def measure(
+    cases: Sequence[Case], rounds: int, seconds: float, progress: Callable[[float], None] | None = None
+) -> NDArray[np.float64]:
+    """Return the CPU time per epoch of each case in each round, us, shape (rounds, cases); recordings last `seconds`."""
+    counts = sorted({case[2] for case in cases})
+    recordings = {count: array(count, seconds) if count else vehicle(seconds) for count in counts}
+    cost = np.empty((rounds, len(cases)))
+    for k in range(-1, rounds):  # a first round warms up
+        for j, (_, method, count, dense) in enumerate(cases):
+            solution = batch.run(recordings[count], method, dense_covariance=dense)
+            cost[k, j] = 1e6 * solution.filter_s / len(solution.time)
+        if progress:
+            progress((k + 2) / (rounds + 1))
+    return cost
+
+
+def machine() -> dict[str, Any]:
+    """Return what the program runs on."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+    }
+
+
+def array(count: int, seconds: float = SECONDS) -> Recording:
     """Return a simulated recording of an array of `count` IMUs; those beyond sixteen repeat the first ones."""
     from polyins.simulation.scenario import Scenario, simulate
 
-    recording = simulate(Scenario(duration_s=SECONDS))
+    recording = simulate(Scenario(duration_s=seconds))
     order = [i % len(recording.imus) for i in range(count)]
     imus = tuple(replace(recording.rig.imus[i], name=f"imu{k}") for k, i in enumerate(order, 1))
     return replace(recording, rig=replace(recording.rig, imus=imus), imus=tuple(recording.imus[i] for i in order))
 
 
-def vehicle() -> Recording:
+def vehicle(seconds: float = SECONDS) -> Recording:
     """Return a simulated recording of a robot: an IMU in each of two wheels and one on the body, no GNSS."""
     from polyins.simulation.scenario import Board, Scenario, simulate
     from polyins.simulation.wheel_scenario import WheelModule
@@ -92,7 +109,7 @@ def vehicle() -> Recording:
         WheelModule(name=name, position_m=(0.0, right, 0.0), radius_m=0.1, chips=1)
         for name, right in (("left", -half), ("right", half))
     )
-    return simulate(Scenario(duration_s=SECONDS, imus=Board(count=1), wheels=wheels, gnss=None, top_speed_m_s=2.0))
+    return simulate(Scenario(duration_s=seconds, imus=Board(count=1), wheels=wheels, gnss=None, top_speed_m_s=2.0))
 
 
 def _processor() -> str:

@@ -237,7 +237,6 @@ def fill_lane(w: Array, lane: int, imu: Imu, start: Start, attitude: Array, erro
     put(bank.IN_VEHICLE, imu.position)
     beside = np.array([imu.position[1], 0.0, 0.0])
     put(bank.TO_SPEED, -imu.position if imu.wheel is None else to_wheel - beside)
-    put(bank.WEIGHT, np.ones(1))
 
 
 def mounting_std(imu: Imu, speed: list[Imu]) -> Array:

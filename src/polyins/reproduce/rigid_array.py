@@ -13,10 +13,12 @@ from polyins import batch, datasets
 from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
 from polyins.evaluation.outages import outage_statistic
-from polyins.recording import Recording
-from polyins.rig import DEG, PPM, ImuErrors
+from polyins.geodesy import metres_per_unit
+from polyins.recording import GnssStream, Recording
 from polyins.reproduce.chips import Chips, compensate, draw_chips, read_chips
+from polyins.rig import DEG, PPM, ImuErrors
 from polyins.simulation.error_scenario import Errors
+from polyins.simulation.imu_errors import gauss_markov
 from polyins.simulation.increments import increments
 from polyins.simulation.path import Path
 from polyins.simulation.replay import replay
@@ -28,9 +30,7 @@ Array = NDArray[np.float64]
 DATASET = "whu-array"
 FIRST, LAST = 270769.0, 273689.0
 """s of week: 60 s before the car first moves, and the end of the last outage"""
-QUICK_S = 600.0
-QUICK_RATE_HZ = 50.0
-STANDS_IN = f"the data set {DATASET} is not at hand: a simulated drive and chips drawn from its statistics stand in"
+QUICK_S = 490.0
 
 INITIAL_STD = ImuErrors(
     gyro_bias=np.full(3, 50.0 / 3600.0 * DEG),
@@ -41,12 +41,17 @@ INITIAL_STD = ImuErrors(
 """What the filter is told of uncompensated chips at the start: the spread of Group 1's; gyro biases are estimated at
 standstill."""
 
+SLOW_STD, SLOW_TIME = np.array([0.006, 0.004, 0.013]), 60.0
+"""m north, east, down, and s: the slow part of the real positions while the car stands"""
+STATED_STD = np.array([0.013, 0.010, 0.023])
+"""m: median of what the real positions state"""
+
 
 def base_scenario(quick: bool) -> Scenario:
-    """Return the scenario of the file, shorter and slower if `quick`."""
+    """Return the scenario of the file, shorter if `quick`."""
     with resources.as_file(resources.files("polyins.reproduce") / "a3.yaml") as file:
         scenario = read_scenario(file)
-    return scenario.model_copy(update={"duration_s": QUICK_S, "rate_hz": QUICK_RATE_HZ}) if quick else scenario
+    return scenario.model_copy(update={"duration_s": QUICK_S}) if quick else scenario
 
 
 def real_chips() -> Chips | None:
@@ -69,6 +74,13 @@ def real_path(duration: float) -> Path | None:
     return replay(rows[:, 0], position, rows[:, 4:7])
 
 
+def provenance() -> str:
+    """Say what the track and Group 1's chips are."""
+    if real_chips() is None:
+        return f"a simulated drive and drawn chips stand in: the data set {DATASET} is not at hand"
+    return f"real, data set {DATASET}"
+
+
 def drive(scenario: Scenario) -> TrueRun:
     """Return the truth on the real track, or on a simulated drive where the data set is not at hand."""
     path = real_path(scenario.duration_s)
@@ -89,11 +101,25 @@ def group_chips(number: int, count: int) -> Chips:
     return real or draw_chips(count, np.random.default_rng([number, 20602]))
 
 
-def recording_of(run: TrueRun, seed: int, initial_std: ImuErrors | None = INITIAL_STD) -> Recording:
-    """Return a recording whose filter knows how far chips may be off at the start."""
+def recording_of(
+    run: TrueRun, seed: int, *, initial_std: ImuErrors | None = INITIAL_STD, slow: bool = True
+) -> Recording:
+    """Return a recording whose filter knows how far chips may be off at the start.
+
+    `slow`: the fixes have the slow errors, and the stated std, of the real ones.
+    """
     recording = record(run, seed=seed).recording
     imus = tuple(replace(imu, initial_std=initial_std) for imu in recording.rig.imus)
-    return replace(recording, rig=replace(recording.rig, imus=imus))
+    assert recording.gnss is not None
+    fixes = _with_slow_errors(recording.gnss, np.random.default_rng([seed, 60])) if slow else recording.gnss
+    return replace(recording, rig=replace(recording.rig, imus=imus), gnss=fixes)
+
+
+def _with_slow_errors(fixes: GnssStream, rng: np.random.Generator) -> GnssStream:
+    interval = float(np.median(np.diff(fixes.time)))
+    slow = SLOW_STD * gauss_markov(len(fixes.time), interval / SLOW_TIME, rng)[:, :3]
+    position = fixes.position + slow / metres_per_unit(fixes.position, geodetic=True)
+    return replace(fixes, position=position, position_std=np.broadcast_to(STATED_STD, position.shape).copy())
 
 
 def compensated(recording: Recording, chips: Chips) -> Recording:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from polyins.config import NotNegative, Number, Section, Triple
-from polyins.rig import DEG, HOUR, MGAL
+from polyins.rig import DEG, HOUR, MGAL, ImuErrors, NoiseGrade
 from polyins.simulation.force_response import STANDARD_GRAVITY
 from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.shared_noise import SharedNoise
@@ -59,6 +59,10 @@ class Errors(Section):
     """share of the variance of biases and scale factors that is constant; the rest drifts"""
     misalignment_deg: NotNegative = 0.0
     """std of the rotation of gyro and accelerometer triads about each axis, deg"""
+    gyro_turn_on_deg_h: NotNegative = 0.0
+    """std of a constant gyro bias besides those under noise, deg/h; the configuration says how large it may be"""
+    accel_turn_on_mgal: NotNegative = 0.0
+    """the same of the accelerometers, mGal"""
     chip_rotation_deg: NotNegative = 0.0
     """std of the rotation of a chip, both triads alike, about each axis, deg; real chips 0.2, hand-made mounts 2"""
     gyro_skew_deg: NotNegative = 0.0
@@ -98,6 +102,8 @@ class Errors(Section):
             noise=self.noise,
             biases=self.biases,
             scales=self.scales,
+            gyro_turn_on_std=self.gyro_turn_on_deg_h * DEG / HOUR,
+            accel_turn_on_std=self.accel_turn_on_mgal * MGAL,
             chip_rotation_std=self.chip_rotation_deg * DEG,
             gyro_skew_std=self.gyro_skew_deg * DEG,
             accel_skew_std=self.accel_skew_deg * DEG,
@@ -110,6 +116,18 @@ class Errors(Section):
             gyro_lsb=self.gyro_lsb_deg_s * DEG,
             accel_lsb=self.accel_lsb_mg * 1e-3 * STANDARD_GRAVITY,
             chips=tuple(entry.chip() for entry in self.chips),
+        )
+
+    def start_std(self, grade: NoiseGrade) -> ImuErrors | None:
+        """Return how large the slow errors may be at the start; None: as large as those of the grade."""
+        gyro, accel = self.gyro_turn_on_deg_h * DEG / HOUR, self.accel_turn_on_mgal * MGAL
+        if gyro == accel == 0.0:
+            return None
+        return ImuErrors(
+            np.hypot(grade.gyro_bias_std, gyro),
+            np.hypot(grade.accel_bias_std, accel),
+            grade.gyro_scale_std,
+            grade.accel_scale_std,
         )
 
     def vibration(self, speed: Array) -> Array:

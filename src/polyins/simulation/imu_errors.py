@@ -39,6 +39,10 @@ class Imperfections:
     noise: bool = True
     biases: bool = True
     scales: bool = True
+    gyro_turn_on_std: float = 0.0
+    """rad/s: of a constant bias besides"""
+    accel_turn_on_std: float = 0.0
+    """m/s^2"""
     chip_rotation_std: float = 0.0
     """rad: rotation of the chip, both triads alike, about each axis"""
     gyro_skew_std: float = 0.0
@@ -164,14 +168,15 @@ def _with_chip(drawn: TrueErrors, imperfections: Imperfections, rng: np.random.G
     gyro_skew, accel_skew = rng.standard_normal((2, 3))
     gyro_response = skewed(imperfections.gyro_skew_std * gyro_skew) @ chip_turn
     accel_response = skewed(imperfections.accel_skew_std * accel_skew) @ chip_turn
-    series = drawn.series
+    force = draw_force_response(
+        imperfections.g_sensitivity_std, imperfections.rectification_mean, imperfections.rectification_std, rng
+    )
+    turn_on = np.repeat([imperfections.gyro_turn_on_std, imperfections.accel_turn_on_std, 0.0, 0.0], 3)
+    series = drawn.series + turn_on * rng.standard_normal(12)
     if imperfections.chips:
         chip = imperfections.chips[number % len(imperfections.chips)]
         gyro_response, accel_response = chip.gyro.response @ gyro_response, chip.accel.response @ accel_response
         series = series + np.concatenate([chip.gyro.bias, chip.accel.bias, np.zeros(6)])
-    force = draw_force_response(
-        imperfections.g_sensitivity_std, imperfections.rectification_mean, imperfections.rectification_std, rng
-    )
     return replace(
         drawn, series=series, gyro_response=gyro_response, accel_response=accel_response, force_response=force
     )

@@ -98,7 +98,7 @@ def _course(velocity: Array, speed: Array, way: Array) -> Array:
     if not fast.any():
         raise InputError(f"replay: the positions never move faster than {HELD_BELOW:g} m/s; expected a drive")
     course = np.unwrap(np.arctan2(velocity[fast, 1], velocity[fast, 0]))
-    return np.interp(way, way[fast], course)
+    return np.asarray(np.interp(way, way[fast], course))
 
 
 def _attitude(speed: Array, heading: Array, way: Array, height: Array, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -118,7 +118,7 @@ def _slope(way: Array, height: Array) -> Array:
     moves = np.append(True, np.diff(way) > 0.0)
     profile = gaussian_filter1d(np.interp(even, way[moves], height[moves]), SLOPE_SMOOTHING, mode="nearest")
     slope = np.arctan(np.gradient(profile)) if even.size > 1 else np.zeros(1)
-    return np.interp(way, even, slope)
+    return np.asarray(np.interp(way, even, slope))
 
 
 def _curve(grid: Array, values: Array) -> BSpline:

@@ -212,13 +212,15 @@ def _calibrated(imu: Imu, scenario: Scenario, errors: TrueErrors) -> Imu:
 def _start(scenario: Scenario, run: TrueRun) -> StartOptions:
     """Return what is known of the start: when it stands, and with nothing but wheels to go by where and how.
 
-    Paper B's lab starts from its reference, and from these standard deviations.
+    A robot that goes to and fro is too slow for a course to show its heading: a reference gives it, as in paper A. B's lab starts from its reference, and from these standard deviations.
     """
     still = (float(run.body.time[0]), scenario.static_s)
     interval = still if still[0] < still[1] else None
+    truth = run.path.truth([scenario.static_s])
+    if scenario.shuttle:
+        return StartOptions(static_interval=interval, heading=float(truth.attitude[0, 2]), heading_from="value")
     if not scenario.wheels or scenario.gnss:
         return StartOptions(static_interval=interval)
-    truth = run.path.truth([scenario.static_s])
     position_std, velocity_std, attitude_std = START_STD
     return StartOptions(
         static_interval=interval,

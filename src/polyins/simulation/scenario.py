@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Annotated, Literal, Self
 
@@ -212,6 +213,7 @@ class Scenario(Section):
                 for index, position in enumerate(self.imus.positions())
             ]
         imus += [imu for wheel in self.wheels for imu in wheel.imus(grade)]
+        imus = [replace(imu, initial_std=self.errors.start_std(grade)) for imu in imus]
         return Rig(tuple(imus), np.array(self.gnss.antenna_position_m if self.gnss else (0.0, 0.0, 0.0)))
 
     def outage_intervals(self) -> tuple[tuple[float, float], ...]:
