@@ -346,7 +346,8 @@ class _RollingSearch(_Search):
     imu_attitudes: Array
 
     def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
-        if self.options.velocity is None and still is None:
+        standing = still is not None and still[0] <= time <= still[1] + 0.5
+        if self.options.velocity is None and not standing:
             raise InputError(
                 "start: no standstill of three seconds; a vehicle with wheels starts at one:"
                 " expected start.static_interval_s, or start.velocity_m_s and start.roll_pitch_deg"

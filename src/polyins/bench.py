@@ -66,7 +66,12 @@ def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
 def measure(
     cases: Sequence[Case], rounds: int, seconds: float, progress: Callable[[float], None] | None = None
 ) -> NDArray[np.float64]:
-    """Return the CPU time per epoch of each case in each round, us, shape (rounds, cases); recordings last `seconds`."""
+    """Return the CPU time per epoch of each case in each round, us, shape (rounds, cases).
+
+    `seconds` is how long the recordings last.
+
+    The cases take turns, so that a change in the machine's speed is the same for all of a round.
+    """
     counts = sorted({case[2] for case in cases})
     recordings = {count: array(count, seconds) if count else vehicle(seconds) for count in counts}
     cost = np.empty((rounds, len(cases)))

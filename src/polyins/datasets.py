@@ -54,7 +54,7 @@ DATASETS = {
         source="https://github.com/i2Nav-WHU/Wheel-INS",
     ),
     "whu-array": Dataset(
-        summary="what is public of 16 ICM-20602 on a car: its RTK track, 1 Hz, 23 km, the chips' calibrations, error curves",
+        summary="a car's RTK track, 1 Hz, 23 km, and the calibrations and error curves of the 16 ICM-20602 on it",
         licence="see the source",
         source="https://github.com/i2Nav-WHU/IMU-Array",
     ),

@@ -55,7 +55,7 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
             "structured": {"steps": counted["structured"], **totals(counted["structured"])},
         },
         "settings": {
-            "counted": "the kernels' Python form on counting numbers; steps, and the structured ones, are polyins's own",
+            "counted": "the kernels' Python form on counting numbers",
             "per_second": f"Table II: IMUs at {RATE_HZ} Hz, one fix",
             "form": "steps and totals with the dense covariance, 21 x 21, and under structured with the product's",
         },

@@ -35,10 +35,9 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
 
 def table(imus: int) -> dict[str, dict[str, int]]:
     """Return the paper's table for that many IMUs."""
-    names = ("mechanization", "prediction", "gain", "feedback", "measurement_fusion", "solution_fusion")
     rows = {
         "single": (200, 200, 1, 1, 0, 0),
         "nav-fusion": (200 * imus, 200 * imus, imus, imus, 0, 200 * imus),
         "enav-fusion": (200 * imus, 200, 1, imus, 200 * imus, (200 * 2 + 1) * imus),
     }
-    return {method: dict(zip(names, row, strict=True)) for method, row in rows.items()}
+    return {method: dict(zip(operations.EXECUTED, row, strict=True)) for method, row in rows.items()}

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from polyins.reproduce import rigid_array
+from polyins.reproduce.chips import Chips
 from polyins.reproduce.pictures import bars, write_figure
 from polyins.reproduce.progress import Steps
-from polyins.reproduce.rigid_array import Chips
 from polyins.simulation.error_scenario import Errors
 from polyins.simulation.run import TrueRun
 
@@ -84,7 +84,9 @@ def reproduce(
     return {
         "target": "a3",
         "paper": {
-            "uncompensated": table({name: dict(zip(("single", *METHODS), row, strict=True)) for name, row in PAPER.items()}),
+            "uncompensated": table(
+                {name: dict(zip(("single", *METHODS), row, strict=True)) for name, row in PAPER.items()}
+            ),
             "compensated": {"group1": {"single": LAB["single"], "imu-fusion": LAB["compensated"]}},
         },
         "polyins": {
@@ -111,7 +113,8 @@ def with_chips(run: TrueRun, errors: Errors, chips: Chips) -> TrueRun:
 def table(rows: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, Any]]:
     """Return the rows, each with the ratios of single to the methods."""
     return {
-        name: {**row, "ratio": {method: row["single"] / row[method] for method in METHODS}} for name, row in rows.items()
+        name: {**row, "ratio": {method: row["single"] / row[method] for method in METHODS}}
+        for name, row in rows.items()
     }
 
 
@@ -193,5 +196,5 @@ def statement(sources: Mapping[str, Mapping[str, float]], candidates: Mapping[st
 def sources_figure(sources: Mapping[str, Mapping[str, float]], imus: int) -> Any:
     """Return the stacked picture of what each source takes of sqrt(N), and what is left."""
     left = list(sources.values())[-1]["ratio"]
-    parts = {"left": left, **{name: row["costs"] for name, row in reversed(sources.items())}}
+    parts = {"left": left, **{name: row["costs"] for name, row in reversed(list(sources.items()))}}
     return bars({"eNav-Fusion": parts}, f"single / array, of sqrt({imus})", "stack")

@@ -32,7 +32,8 @@ ACCEL_OFFSET_MGAL = (11157.0, 6541.0, 13576.0)
 def read_chips(folder: Path) -> Chips:
     """Return the calibrations of Group 1's chips from the folder of the data set whu-array."""
     gyro, accel = (np.loadtxt(folder / f"{name}_calibration_group1.txt") for name in ("gyro", "accel"))
-    return tuple(_entry(g[:9].reshape(3, 3), g[9:], a[:9].reshape(3, 3), a[9:]) for g, a in zip(gyro, accel, strict=True))
+    rows = zip(gyro, accel, strict=True)
+    return tuple(_entry(g[:9].reshape(3, 3), g[9:], a[:9].reshape(3, 3), a[9:]) for g, a in rows)
 
 
 def draw_chips(count: int, rng: np.random.Generator) -> Chips:

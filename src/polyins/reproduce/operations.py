@@ -102,9 +102,7 @@ def counting_math() -> SimpleNamespace:
 
         return call
 
-    return SimpleNamespace(
-        sqrt=counted(math.sqrt), sin=counted(math.sin), cos=counted(math.cos), floor=math.floor, pi=math.pi, inf=math.inf
-    )
+    return SimpleNamespace(sqrt=counted(math.sqrt), sin=counted(math.sin), cos=counted(math.cos))
 
 
 def counting(array: NDArray[np.float64]) -> NDArray[Any]:
@@ -231,11 +229,15 @@ def _less(whole: Tally, part: Tally) -> Tally:
     return {key: whole[key] - part[key] for key in whole}
 
 
+EXECUTED = ("mechanization", "prediction", "gain", "feedback", "measurement_fusion", "solution_fusion")
+"""The steps of Table II."""
+
+
 def count_executions(method: str, imus: int) -> dict[str, int]:
     """Return how often the steps of Table II are done in one second with one fix, once for each IMU or share."""
     from polyins.kernels import bank, fuse, kalman, share, strapdown
 
-    tally = dict.fromkeys(("mechanization", "prediction", "gain", "feedback", "measurement_fusion", "solution_fusion"), 0)
+    tally = dict.fromkeys(EXECUTED, 0)
 
     def watch(module: Any, name: str, step: str, times: Callable[..., int]) -> None:
         original = getattr(module, name)

@@ -31,7 +31,11 @@ def bars(groups: Mapping[str, Mapping[str, float]], title: str, mode: Literal["g
 
 
 def lines(
-    curves: Mapping[str, tuple[Sequence[float], Sequence[float]]], x_title: str, y_title: str, *, logarithmic: bool = False
+    curves: Mapping[str, tuple[Sequence[float], Sequence[float]]],
+    x_title: str,
+    y_title: str,
+    *,
+    logarithmic: bool = False,
 ) -> Figure:
     """Return curves by name, each as x and y."""
     from plotly.graph_objects import Figure, Scatter

@@ -1,0 +1,176 @@
+"""Paper A, Fig. 3, and two curves it leaves out: the gain against the number of IMUs and against what they share.
+
+Fig. 3 shows how little the position std of six separate filters differs, which is why they may share one covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins import batch
+from polyins.reproduce.array import EXACT_GNSS, MODELLED
+from polyins.reproduce.pictures import lines, write_figure
+from polyins.reproduce.progress import Steps
+from polyins.reproduce.rigid_array import maxima, rms
+from polyins.simulation.run import TrueRun, record, true_run
+from polyins.simulation.scenario import Board, Scenario
+
+Array = NDArray[np.float64]
+
+PLACES = (
+    (-0.18, 0.32, 0.0),
+    (-0.18, -0.32, 0.0),
+    (0.02, 0.435, 0.0),
+    (0.02, -0.435, 0.0),
+    (0.20, 0.265, 0.0),
+    (0.20, -0.265, 0.0),
+)
+"""m: six IMUs at the ends of three rulers, up to 46 cm from the middle, here rigid"""
+ROBOT = Scenario(
+    name="six IMUs on a robot",
+    duration_s=75.0,
+    static_s=20.0,
+    top_speed_m_s=1.5,
+    imus=Board(count=1),
+    outages=(),
+)
+"""The paper's robot drives up to 1.5 m/s."""
+SHOWN = (51.0, 53.0)
+"""s after the start: what the paper's figure shows"""
+
+COUNTS = (1, 2, 4, 8, 16, 32, 64)
+QUICK_COUNTS = (1, 2, 4, 8, 16)
+SHARES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+QUICK_SHARES = (0.0, 0.05, 0.2)
+COMMON = 0.05
+"""share of the second curve against the number of IMUs"""
+SEEDS = 4
+IMUS = 16
+ARRAY = Scenario(duration_s=600.0, rate_hz=50.0, gnss=EXACT_GNSS, errors=MODELLED)
+"""Exact fixes, so that the IMUs have nothing in common but what they are given."""
+
+PAPER_FIG3 = {"before_fix_m": [0.155, 0.193], "after_fix_m": [0.018, 0.021]}
+"""least and largest east std of six IMUs after one second and after the fix, as the text gives them"""
+
+Document = dict[str, Any]
+
+
+def reproduce(
+    quick: bool = False, progress: Callable[[float], None] | None = None, out: Path | None = None
+) -> Document:
+    """Return the document; `quick` takes fewer IMUs, shares and seeds. `out` is the folder for the pictures."""
+    counts, shares, seeds = (QUICK_COUNTS, QUICK_SHARES, 1) if quick else (COUNTS, SHARES, SEEDS)
+    steps = Steps(progress, 1 + seeds * (2 + len(shares)))
+    time, std = six_filters()
+    steps.next()(1.0)
+    by_count = {
+        "independent": against_count(counts, 0.0, seeds, steps),
+        f"common {COMMON:g}": against_count(counts, COMMON, seeds, steps),
+    }
+    by_share = against_share(shares, seeds, steps)
+    if out is not None:
+        write_pictures(out, time, std, by_count, by_share)
+    return {
+        "target": "afig3",
+        "paper": {"fig3": PAPER_FIG3, "ratio_by_imus": {}, "ratio_by_common_share": {}},
+        "polyins": {
+            "fig3": around_fixes(time, std),
+            "ratio_by_imus": by_count,
+            "ratio_by_common_share": by_share,
+        },
+        "settings": {
+            "fig3": "least and largest std north, east or down of six separate filters, before and after fixes",
+            "places_m": PLACES,
+            "seeds": seeds,
+            "sqrt_n": {str(n): float(np.sqrt(n)) for n in counts},
+            "expected_by_share": {f"{c:g}": expected(IMUS, c) for c in shares},
+            "robot": ROBOT.model_dump(mode="json"),
+            "array": ARRAY.model_dump(mode="json"),
+        },
+    }
+
+
+def expected(imus: int, common: float) -> float:
+    """Return the gain of a mean of errors that share a part of their variance."""
+    return float(1.0 / np.sqrt(common + (1.0 - common) / imus))
+
+
+def six_filters() -> tuple[Array, Array]:
+    """Return times since the start, s, shape (T,), and the position std of six separate filters, m, shape (6, T, 3)."""
+    std = []
+    truth = true_run(ROBOT)
+    for place in PLACES:
+        board = ROBOT.imus.model_copy(update={"position_m": place})
+        placed = replace(truth, scenario=truth.scenario.model_copy(update={"imus": board}))
+        solution = batch.run(record(placed, seed=ROBOT.seed).recording, "single")
+        std.append(solution.position_std)
+    time = solution.time - ROBOT.static_s
+    shown = (time >= SHOWN[0]) & (time <= SHOWN[1])
+    return time[shown], np.array(std)[:, shown]
+
+
+def around_fixes(time: Array, std: Array) -> dict[str, list[float]]:
+    """Return least and largest std of the six just before and just after the fixes, over all axes."""
+    east = std[:, :, 1]
+    at = np.flatnonzero(np.diff(east[0]) < 0.0)
+    before, after = east[:, at], east[:, at + 1]
+    return {
+        "before_fix_m": [float(before.min()), float(before.max())],
+        "after_fix_m": [float(after.min()), float(after.max())],
+    }
+
+
+def _with_common(truth: TrueRun, common: float, imus: int) -> TrueRun:
+    errors = MODELLED.model_copy(update={"common_noise_share": common, "common_drift_share": common})
+    scenario = truth.scenario.model_copy(update={"errors": errors, "imus": Board(count=imus)})
+    return replace(truth, scenario=scenario)
+
+
+def against_count(counts: Sequence[int], common: float, seeds: int, steps: Steps) -> dict[str, float]:
+    """Return single over eNav-Fusion of the first N IMUs, by N; each the ratio of rms over seeds and outages."""
+    squares: dict[int, list[float]] = {0: [], **{n: [] for n in counts}}
+    for seed in range(seeds):
+        report = steps.next()
+        truth = true_run(ARRAY.model_copy(update={"seed": seed}))
+        recording = record(_with_common(truth, common, max(counts)), seed=seed).recording
+        singles = min(max(counts), IMUS)
+        squares[0] += [rms(maxima(recording, "single", imu=i)) ** 2 for i in range(singles)]
+        for k, n in enumerate(counts, 1):
+            squares[n].append(rms(maxima(recording.subset(range(n)), "enav-fusion")) ** 2)
+            report(k / len(counts))
+    return {str(n): float(np.sqrt(np.mean(squares[0]) / np.mean(squares[n]))) for n in counts}
+
+
+def against_share(shares: Sequence[float], seeds: int, steps: Steps) -> dict[str, float]:
+    """Return single over eNav-Fusion of 16 IMUs by the share of the variance that they have in common."""
+    squares: dict[float, list[tuple[float, float]]] = {common: [] for common in shares}
+    for seed in range(seeds):
+        truth = true_run(ARRAY.model_copy(update={"seed": seed}))
+        for common in shares:
+            recording = record(_with_common(truth, common, IMUS), seed=seed).recording
+            single = np.mean([rms(maxima(recording, "single", imu=i)) ** 2 for i in range(IMUS)])
+            squares[common].append((float(single), rms(maxima(recording, "enav-fusion")) ** 2))
+            steps.next()(1.0)
+    return {f"{c:g}": float(np.sqrt(np.divide(*np.mean(values, axis=0)))) for c, values in squares.items()}
+
+
+def write_pictures(out: Path, time: Array, std: Array, by_count: Document, by_share: Document) -> None:
+    """Write the three figures."""
+    curves = {f"IMU {k}": (time.tolist(), row[:, 1].tolist()) for k, row in enumerate(std, 1)}
+    write_figure(lines(curves, "time since start (s)", "east std (m)"), out / "afig3-std.html")
+    counts = [float(n) for n in next(iter(by_count.values()))]
+    ratios = {name: (counts, list(row.values())) for name, row in by_count.items()}
+    ratios["sqrt(N)"] = (counts, np.sqrt(counts).tolist())
+    write_figure(lines(ratios, "IMUs", "single / array", logarithmic=True), out / "afig3-imus.html")
+    shares = [float(c) for c in by_share]
+    gains = {
+        "eNav-Fusion": (shares, list(by_share.values())),
+        "expected": (shares, [expected(IMUS, c) for c in shares]),
+    }
+    write_figure(lines(gains, "share of variance in common", "single / array of 16"), out / "afig3-common.html")
