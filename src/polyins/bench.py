@@ -66,7 +66,7 @@ def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
 def measure(
     cases: Sequence[Case], rounds: int, seconds: float, progress: Callable[[float], None] | None = None
 ) -> NDArray[np.float64]:
-    """Return the CPU time per epoch of each case in each round, us, shape (rounds, cases).
+    """Return the CPU time per epoch of each case in each round, us, (rounds, cases).
 
     `seconds` is how long the recordings last.
 

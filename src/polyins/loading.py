@@ -69,7 +69,7 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     notes = wheel_checks.check_settings(config, document)
     read = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
     imus, streams, warnings = zip(*read, strict=True)
-    notes += [text for texts in warnings for text in texts]
+    notes += _one_by_kind([text for texts in warnings for text in texts])
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
     notes += [clocks.described(offset) for offset in offsets]
     span = checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})
@@ -116,6 +116,18 @@ def _in_force(config: Config, offsets: tuple[Offset, ...]) -> str:
     gnss = config.gnss and config.gnss.model_copy(update={"time_offset": None})
     known = config.model_copy(update={"imus": imus, "gnss": gnss})
     return write_yaml(known.model_dump(mode="json", exclude=NOT_IN_FORCE))
+
+
+def _one_by_kind(notes: list[str]) -> list[str]:
+    """Say only once what several files have in common, word for word but for their names."""
+    places: dict[str, list[str]] = {}
+    for note in notes:
+        place, _, text = note.partition(": ")
+        places.setdefault(text, []).append(place)
+    return [
+        f"{found[0]}{f' and {len(found) - 1} files more' if len(found) > 1 else ''}: {text}"
+        for text, found in places.items()
+    ]
 
 
 def _filter_options(config: Config) -> FilterOptions:

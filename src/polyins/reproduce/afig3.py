@@ -109,7 +109,7 @@ def six_filters() -> tuple[Array, Array]:
         board = ROBOT.imus.model_copy(update={"position_m": place})
         placed = replace(truth, scenario=truth.scenario.model_copy(update={"imus": board}))
         solution = batch.run(record(placed, seed=ROBOT.seed).recording, "single")
-        std.append(solution.position_std)
+        std.append(np.sqrt(solution.position_variance))
     time = solution.time - ROBOT.static_s
     shown = (time >= SHOWN[0]) & (time <= SHOWN[1])
     return time[shown], np.array(std)[:, shown]

@@ -11,10 +11,12 @@ is where the IMU s is as seen from the smooth path p. Gravity bends the rulers a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.kernels.jit import kernel
 from polyins.simulation.cantilever import Cantilever
 from polyins.simulation.shaking import Shaking
 from polyins.simulation.transmission import transmit
@@ -49,34 +51,20 @@ class Ruler:
         return self.tuning * self.beam.bending_rate
 
 
-@dataclass(frozen=True)
-class Flexing:
-    """How a ruler bends and twists, every `step` s from time 0; its derivatives beside it. Shape (T,) each."""
-
-    bend: Array
-    """d, m"""
-    bend_rate: Array
-    """m/s"""
-    twist: Array
-    """rad"""
-    twist_rate: Array
-    """rad/s"""
-
-
-def flex(ruler: Ruler, shaking: Shaking, gravity: float) -> Flexing:
-    """Return how a ruler bends and twists on a body that shakes.
+def flex(ruler: Ruler, shaking: Shaking, gravity: float) -> Array:
+    """Return bend, m, twist, rad, and their derivatives, shape (T, 4), of a ruler on a body that shakes.
 
     Seen from outside, the tip is a mass on a spring whose foot is the clamp: the deflection is what it lags behind.
     """
     if ruler.stiff:
-        return Flexing(*np.zeros((4, len(shaking.motion))))
+        return np.zeros((len(shaking.motion), 4))
     beam, foot = ruler.beam, foot_of(ruler)
     moved, moving = shaking.motion @ foot, shaking.change @ foot
     place, speed = transmit(moved, shaking.step, ruler.bending_rate, ruler.damping)
     sag = beam.gain * gravity / ruler.bending_rate**2
     turn, turning = shaking.motion[:, 1], shaking.change[:, 1]
     angle, rate = transmit(turn, shaking.step, ruler.tuning * beam.torsion_rate, ruler.damping)
-    return Flexing(place - moved + sag, speed - moving, angle - turn, rate - turning)
+    return np.column_stack([place - moved + sag, angle - turn, speed - moving, rate - turning])
 
 
 def foot_of(ruler: Ruler) -> Array:
@@ -88,64 +76,53 @@ def foot_of(ruler: Ruler) -> Array:
     )
 
 
-@dataclass(frozen=True)
-class TipMotion:
-    """Where a tip is relative to the smooth path p, and how it moves there; shape (T, ...)."""
-
-    C_ps: Array
-    """(T, 3, 3)"""
-    angles: Array
-    """about x, y, z, rad: roll + bend, pitch + twist, 0, (T, 3)"""
-    angle_rates: Array
-    """their derivatives, which `rate` is but for products of small angles, (T, 3)"""
-    rate: Array
-    """w_ps in s, rad/s, (T, 3)"""
-    place: Array
-    """u in p, m, (T, 3)"""
-    speed: Array
-    """du/dt in p, m/s, (T, 3)"""
+@kernel
+def orientation(d: float, twist: float, pitch: float, roll: float, per_metre: float, C: Array) -> None:
+    """Write C_ps, 3 x 3, of a module whose ruler bends by d, m, and turns by `per_metre` times that."""
+    g = roll + per_metre * d
+    sg, sp, sb, cg, cp, cb = sin(g), sin(pitch), sin(twist), cos(g), cos(pitch), cos(twist)
+    C[0, 0], C[0, 1], C[0, 2] = cp * cb - sp * cg * sb, sp * sg, cp * sb + sp * cg * cb
+    C[1, 0], C[1, 1], C[1, 2] = sg * sb, cg, -sg * cb
+    C[2, 0], C[2, 1], C[2, 2] = -sp * cb - cp * cg * sb, cp * sg, -sp * sb + cp * cg * cb
 
 
-def tip_motion(ruler: Ruler, flexing: Flexing, shaking: Shaking, part: slice) -> TipMotion:
-    """Return how the IMU of a ruler moves relative to the smooth path, for a part of the samples."""
-    heave, pitch, roll = shaking.motion[part].T
-    rise, pitching, rolling = shaking.change[part].T
-    d, d_rate = flexing.bend[part], flexing.bend_rate[part]
-    b, b_rate = flexing.twist[part], flexing.twist_rate[part]
-    beam, side = ruler.beam, ruler.side
-    per_metre = side * beam.slope / beam.length
+@kernel
+def tip_motion(motion: Array, change: Array, flexing: Array, shape: Array, moved: Array) -> None:
+    """Write how an IMU moves relative to the smooth path p.
+
+    `motion` is heave, pitch, roll of the body, `change` its derivative, `flexing` bend, twist and their derivatives;
+    `shape` is from `shape_of`. `moved` holds C_ps row by row; w_ps in s, rad/s; u in p, m; du/dt in p, m/s: (18,).
+    """
+    heave, pitch, roll = motion[0], motion[1], motion[2]
+    rise, pitching, rolling = change[0], change[1], change[2]
+    d, b, d_rate, b_rate = flexing[0], flexing[1], flexing[2], flexing[3]
+    per_metre, short, h = shape[3], shape[4], shape[5]
+    orientation(d, b, pitch, roll, per_metre, moved[:9].reshape(3, 3))
     g, g_rate = roll + per_metre * d, rolling + per_metre * d_rate
-    short = side * beam.shortening / beam.length
-    none = np.zeros_like(d)
-    arm = ruler.tip + np.column_stack([none, -short * d**2, d])
-    arm_rate = np.column_stack([none, -2.0 * short * d * d_rate, d_rate])
-    (sg, sp, sb, sr), (cg, cp, cb, cr) = np.sin([g, pitch, b, roll]), np.cos([g, pitch, b, roll])
-    # from p: turned by pitch, then about x by the roll for the arm, by roll and bend for the module
-    y, z = cr * arm[:, 1] - sr * arm[:, 2], sr * arm[:, 1] + cr * arm[:, 2]
-    y_rate = cr * arm_rate[:, 1] - sr * arm_rate[:, 2] - rolling * z
-    z_rate = sr * arm_rate[:, 1] + cr * arm_rate[:, 2] + rolling * y
-    h = beam.tip_height
-    x = arm[:, 0] - h * sb
-    x_rate = -h * cb * b_rate
+    sg, sp, sb, sr, cg, cp, cb, cr = (
+        sin(g), sin(pitch), sin(b), sin(roll), cos(g), cos(pitch), cos(b), cos(roll)
+    )  # fmt: skip
+    across = -pitching * sg
+    moved[9], moved[10], moved[11] = g_rate * cb - across * sb, pitching * cg + b_rate, g_rate * sb + across * cb
+    # the tip from the array origin, turned by the roll
+    along, along_rate = shape[1] - short * d * d, -2.0 * short * d * d_rate
+    down, down_rate = shape[2] + d, d_rate
+    y, z = cr * along - sr * down, sr * along + cr * down
+    y_rate = cr * along_rate - sr * down_rate - rolling * z
+    z_rate = sr * along_rate + cr * down_rate + rolling * y
+    # the module above the tip
+    x, x_rate = shape[0] - h * sb, -h * cb * b_rate
     y, y_rate = y + h * sg * cb, y_rate + h * (cg * cb * g_rate - sg * sb * b_rate)
     z, z_rate = z - h * cg * cb, z_rate + h * (sg * cb * g_rate + cg * sb * b_rate)
-    place = np.column_stack([cp * x + sp * z, y, cp * z - sp * x + heave])
-    speed = np.column_stack(
-        [
-            cp * x_rate + sp * z_rate + pitching * (cp * z - sp * x),
-            y_rate,
-            cp * z_rate - sp * x_rate - pitching * (sp * z + cp * x) + rise,
-        ]
-    )
-    C_ps = np.stack(
-        [
-            cp * cb - sp * cg * sb, sp * sg, cp * sb + sp * cg * cb,
-            sg * sb, cg, -sg * cb,
-            -sp * cb - cp * cg * sb, cp * sg, -sp * sb + cp * cg * cb,
-        ],
-        axis=-1,
-    ).reshape(-1, 3, 3)  # fmt: skip
-    across = pitching * -sg
-    rate = np.column_stack([g_rate * cb - across * sb, pitching * cg + b_rate, g_rate * sb + across * cb])
-    angles, angle_rates = np.column_stack([g, pitch + b, none]), np.column_stack([g_rate, pitching + b_rate, none])
-    return TipMotion(C_ps, angles, angle_rates, rate, place, speed)
+    # all turned by the pitch, and heaved
+    moved[12], moved[13], moved[14] = cp * x + sp * z, y, cp * z - sp * x + heave
+    moved[15] = cp * x_rate + sp * z_rate + pitching * (cp * z - sp * x)
+    moved[16] = y_rate
+    moved[17] = cp * z_rate - sp * x_rate - pitching * (sp * z + cp * x) + rise
+
+
+def shape_of(ruler: Ruler) -> Array:
+    """Return what `tip_motion` has to know of a ruler: its tip, slope and shortening, and the module's height, (6,)."""
+    beam, side = ruler.beam, ruler.side
+    bending = (side * beam.slope / beam.length, side * beam.shortening / beam.length)
+    return np.array([*ruler.tip, *bending, beam.tip_height])

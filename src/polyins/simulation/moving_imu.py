@@ -8,25 +8,26 @@ A = (w x)(w x) - ... as in `increments`, without dw/dt. As d(C_sp)/dt = -w_ps^s 
 second derivative:
 
     integral C_sp dv/dt = [C_sp v] + integral w_ps^s x (C_sp v).
+
+The integrals are Simpson's over the samples of the motion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.simulation.flexible import TipMotion
+from polyins.kernels.jit import kernel
+from polyins.simulation.flexible import Ruler, shape_of, tip_motion
 from polyins.simulation.increments import rates
 from polyins.simulation.path import Path
-from polyins.simulation.shaking import to_frame
+from polyins.simulation.shaking import Shaking
 
 Array = NDArray[np.float64]
 
 FINE_STEPS = 10
 """samples of the motion in each interval: 2 kHz for increments at 200 Hz"""
-BLOCK = 2_000  # intervals worked on at once
+BLOCK = 20_000  # instants worked on at once
 
 
 def simpson(step: float) -> Array:
@@ -54,53 +55,94 @@ def smooth_rates(path: Path, count: int, interval: float) -> Array:
     """
     time = interval * np.arange(-1.0, count + 2.0)
     parts = []
-    for first in range(0, time.size, 20_000):
-        rate, force, arm = rates(path, time[first : first + 20_000])
+    for first in range(0, time.size, BLOCK):
+        rate, force, arm = rates(path, time[first : first + BLOCK])
         parts.append(np.hstack([rate, force, arm.reshape(-1, 9)]))
     return np.vstack(parts)
 
 
-def moving_increments(
-    smooth: Array, motion: Callable[[slice], TipMotion], interval: float
-) -> tuple[Array, Array]:
+def moving_increments(smooth: Array, ruler: Ruler, flexing: Array, shaking: Shaking) -> tuple[Array, Array]:
     """Return (dtheta, dvel), shape (T, 3) each, of an IMU in its own axes.
 
-    `smooth` is from `smooth_rates`; `motion` returns a slice of the samples, FINE_STEPS in each interval.
+    `smooth` is from `smooth_rates`, `flexing` from `flex`.
     """
-    count = len(smooth) - 3
-    dtheta, dvel = np.empty((count, 3)), np.empty((count, 3))
-    for first in range(0, count, BLOCK):
-        last = min(first + BLOCK, count)
-        moved = motion(slice(first * FINE_STEPS, last * FINE_STEPS + 1))
-        dtheta[first:last], dvel[first:last] = _integrate(smooth[first : last + 3], moved, interval)
-    return dtheta, dvel
+    increments = np.empty((len(smooth) - 3, 6))
+    cubic, weights = interpolation(), simpson(shaking.step)
+    _integrate(smooth, shaking.motion, shaking.change, flexing, shape_of(ruler), cubic, weights, increments)
+    return increments[:, :3].copy(), increments[:, 3:].copy()
 
 
-def _integrate(smooth: Array, moved: TipMotion, interval: float) -> tuple[Array, Array]:
-    rate, force, arm = np.split(_at_samples(smooth), [3, 6], axis=1)
-    step = interval / FINE_STEPS
-    turning = to_frame(moved.C_ps, rate) + moved.rate
-    v = moved.speed + np.cross(rate, moved.place)
-    seen = to_frame(moved.C_ps, v)
-    push = force + (arm.reshape(-1, 3, 3) @ moved.place[..., None])[..., 0] + np.cross(rate, moved.speed)
-    felt = to_frame(moved.C_ps, push) + np.cross(moved.rate, seen)
-    # the rate is nearly the derivative of the angles: only the rest needs quadrature
-    rest = turning - moved.angle_rates
-    return (
-        _integral(rest, step) + np.diff(moved.angles[::FINE_STEPS], axis=0),
-        _integral(felt, step) + np.diff(seen[::FINE_STEPS], axis=0),
-    )
+@kernel
+def _integrate(
+    smooth: Array,
+    motion: Array,
+    change: Array,
+    flexing: Array,
+    shape: Array,
+    cubic: Array,
+    weights: Array,
+    increments: Array,
+) -> None:
+    """Write dtheta and dvel of each interval."""
+    rates_now, moved, seen, felt = np.empty(15), np.empty(18), np.empty(3), np.empty(6)
+    for k in range(len(increments)):
+        total = increments[k]
+        for i in range(6):
+            total[i] = 0.0
+        for j in range(FINE_STEPS + 1):
+            n = k * FINE_STEPS + j
+            _interpolate(smooth, k, cubic, j, rates_now)
+            tip_motion(motion[n], change[n], flexing[n], shape, moved)
+            _felt(rates_now, moved, seen, felt)
+            # the rate is nearly the derivative of these angles: only the rest needs quadrature
+            felt[0] -= change[n, 2] + shape[3] * flexing[n, 2]
+            felt[1] -= change[n, 1] + flexing[n, 3]
+            for i in range(6):
+                total[i] += weights[j] * felt[i]
+            if j == 0 or j == FINE_STEPS:
+                sign = 1.0 if j else -1.0
+                total[0] += sign * (motion[n, 2] + shape[3] * flexing[n, 0])
+                total[1] += sign * (motion[n, 1] + flexing[n, 1])
+                for i in range(3):
+                    total[3 + i] += sign * seen[i]
 
 
-def _at_samples(smooth: Array) -> Array:
-    """Return the rates of the path at all samples, shape (T, 15)."""
-    windows = np.lib.stride_tricks.sliding_window_view(smooth, 4, axis=0)
-    values = np.swapaxes(windows @ interpolation(), 1, 2)
-    return np.vstack([values[:, :-1].reshape(-1, smooth.shape[1]), values[-1, -1:]])
+@kernel
+def _interpolate(smooth: Array, k: int, cubic: Array, j: int, rates_now: Array) -> None:
+    """Write the rates of the path at sample j of interval k."""
+    for i in range(15):
+        rates_now[i] = (
+            cubic[0, j] * smooth[k, i]
+            + cubic[1, j] * smooth[k + 1, i]
+            + cubic[2, j] * smooth[k + 2, i]
+            + cubic[3, j] * smooth[k + 3, i]
+        )
 
 
-def _integral(values: Array, step: float) -> Array:
-    """Return the integrals over the intervals, shape (intervals, 3)."""
-    inner = values[:-1].reshape(-1, FINE_STEPS, 3)
-    weights = simpson(step)
-    return np.asarray(np.einsum("k,tki->ti", weights[:-1], inner) + weights[-1] * values[FINE_STEPS::FINE_STEPS])
+@kernel
+def _felt(path: Array, moved: Array, seen: Array, felt: Array) -> None:
+    """Write C_sp v over `seen`, and w_is^s and the part of f^s that needs quadrature over `felt`."""
+    w, force, arm = path[:3], path[3:6], path[6:15]
+    rate, place, speed = moved[9:12], moved[12:15], moved[15:18]
+    _to_module(moved, w[0], w[1], w[2], felt, 0)
+    vx = speed[0] + w[1] * place[2] - w[2] * place[1]
+    vy = speed[1] + w[2] * place[0] - w[0] * place[2]
+    vz = speed[2] + w[0] * place[1] - w[1] * place[0]
+    _to_module(moved, vx, vy, vz, seen, 0)
+    fx = force[0] + arm[0] * place[0] + arm[1] * place[1] + arm[2] * place[2] + w[1] * speed[2] - w[2] * speed[1]
+    fy = force[1] + arm[3] * place[0] + arm[4] * place[1] + arm[5] * place[2] + w[2] * speed[0] - w[0] * speed[2]
+    fz = force[2] + arm[6] * place[0] + arm[7] * place[1] + arm[8] * place[2] + w[0] * speed[1] - w[1] * speed[0]
+    _to_module(moved, fx, fy, fz, felt, 3)
+    felt[0] += rate[0]
+    felt[1] += rate[1]
+    felt[2] += rate[2]
+    felt[3] += rate[1] * seen[2] - rate[2] * seen[1]
+    felt[4] += rate[2] * seen[0] - rate[0] * seen[2]
+    felt[5] += rate[0] * seen[1] - rate[1] * seen[0]
+
+
+@kernel
+def _to_module(moved: Array, x: float, y: float, z: float, out: Array, to: int) -> None:
+    """Write C_sp times a vector; C_ps begins `moved`."""
+    for i in range(3):
+        out[to + i] = moved[i] * x + moved[3 + i] * y + moved[6 + i] * z

@@ -68,7 +68,7 @@ def ground(
 ) -> Ground:
     """Draw the ground along a way of a length, m; tyres average it over `envelope`, m."""
     from scipy.interpolate import CubicSpline
-    from scipy.ndimage import uniform_filter1d
+    from scipy.ndimage import convolve1d
 
     along = np.arange(-MARGIN, length + MARGIN, STEP)
     common, left, right = (_rough(along.size, roughness, rng) for _ in range(3))
@@ -78,8 +78,15 @@ def ground(
     for bump in bumps:
         under = (along >= bump.begin) & (along < bump.begin + bump.length)
         heights[under] += bump.height * np.array([bump.left, bump.right])
-    heights = uniform_filter1d(heights, max(1, round(envelope / STEP)), axis=0, mode="nearest")
-    return Ground(CubicSpline(along, heights))
+    return Ground(CubicSpline(along, convolve1d(heights, _footprint(envelope), axis=0, mode="nearest")))
+
+
+def _footprint(length: float) -> Array:
+    """Return how a wheel weighs the ground under its footprint: Hertz's pressure of a line contact, semi-elliptic."""
+    reach = int(length / 2.0 / STEP)
+    place = STEP * np.arange(-reach, reach + 1)
+    pressure = np.sqrt(np.maximum(1.0 - (2.0 * place / length) ** 2, 0.0)) if reach else np.ones(1)
+    return np.asarray(pressure / pressure.sum())
 
 
 def _rough(count: int, roughness: Roughness, rng: np.random.Generator) -> Array:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,7 @@ from polyins.io.yaml_document import write_yaml
 from polyins.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.rig import DEG, Imu
 from polyins.simulation import gnss
-from polyins.simulation.flexible import flex, tip_motion
+from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Road
 from polyins.simulation.ground import without_twist
 from polyins.simulation.imu_errors import TrueErrors, corrupt, draw_errors
@@ -114,8 +113,7 @@ def _on_rulers(run: TrueRun, rng: np.random.Generator) -> TrueRun:
     gravity = float(path.world.gravity(path.position(np.zeros(1)))[0])
     tips = {}
     for imu, ruler in zip(scenario.rig().imus, rulers, strict=True):
-        flexing = flex(ruler, shaking, gravity)
-        tips[imu.name] = moving_increments(smooth, partial(tip_motion, ruler, flexing, shaking), interval)
+        tips[imu.name] = moving_increments(smooth, ruler, flex(ruler, shaking, gravity), shaking)
     return replace(run, path=shaken_path(path, shaking), tips=tips)
 
 
