@@ -269,6 +269,11 @@ def test_a_method_says_what_it_lacks(method: str, kept: list[int], message: str)
         pi.run(recording.subset([order[k] for k in kept]), method)
 
 
+def test_array_methods_are_not_for_vehicles() -> None:
+    with pytest.raises(InputError, match="enav-fusion is for arrays; this rig has wheels"):
+        pi.run(drive(), "enav-fusion")
+
+
 def test_what_a_rig_allows() -> None:
     recording = drive()
     assert modules.available(recording.rig) == [

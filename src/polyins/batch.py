@@ -115,6 +115,8 @@ def run(
 def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance: bool = False) -> Prepared:
     """Lay a run out, as `run` does before its first epoch."""
     row = find_method(method)
+    if recording.rig.rolling and not row.rolling:
+        raise InputError(f"method: {row.name} is for arrays; this rig has wheels: expected one like wheel-ins")
     if row.bank == "one":
         if not 0 <= imu < len(recording.imus):
             raise InputError(f"imu: {imu} is not an index of {len(recording.imus)} IMUs; they count from 0")

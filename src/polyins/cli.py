@@ -80,13 +80,17 @@ def demo(out: Path) -> None:
 
 @cli.command()
 @click.argument("config", type=FILE)
-@click.option("--method", default=None, help="A row of the method table; enav-fusion, or single with one IMU.")
+@click.option(
+    "--method",
+    default=None,
+    help="A row of the method table; unless given enav-fusion, single with one IMU, or what the wheels allow.",
+)
 @click.option("--imu", default=None, help="The IMU that `single` uses, by name; the first unless given.")
 @out_option("polyins-out")
 @as_json_option
 @no_report_option
 def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool) -> None:
-    """Run one method over one recording (polyins YAML, or a KF-GINS configuration)."""
+    """Run one method over one recording (polyins YAML, or a KF-GINS or Wheel-INS configuration)."""
     from polyins import batch, results
     from polyins.evaluation.summary import summarize
     from polyins.loading import load
@@ -98,6 +102,8 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
         raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
     with progress("reading"):
         recording = load(config)
+    if imu is not None and recording.rig.rolling:
+        raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
     name = method or _usual_method(recording, imu)
     index = _imu_index([one.name for one in recording.rig.imus], imu)
     results.make_folder(out)
@@ -134,7 +140,7 @@ def _imu_index(names: list[str], wanted: str | None) -> int:
 
 @cli.command()
 @click.argument("config", type=FILE)
-@click.option("--methods", default=None, help="Names separated by commas; all array methods unless given.")
+@click.option("--methods", default=None, help="Names separated by commas; unless given all that the rig allows.")
 @out_option("polyins-out")
 @as_json_option
 @no_report_option

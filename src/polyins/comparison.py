@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from polyins import batch
-from polyins.evaluation.summary import comparison, summarize
 from polyins.errors import InputError
+from polyins.evaluation.summary import comparison, summarize
 from polyins.methods import ARRAY_METHODS, find_method
 from polyins.modules import available
 from polyins.recording import Recording

@@ -10,9 +10,12 @@ from click.testing import CliRunner, Result
 from pymap3d import ned2geodetic
 from simulated_drive import body_stream, drive, fixes, wheel_stream
 
+from polyins.calibration.configuration import calibrated
+from polyins.calibration.drive import Calibration, Estimate
 from polyins.cli import cli
+from polyins.config import parse
 from polyins.errors import InputError
-from polyins.io.yaml_document import read_yaml, write_yaml
+from polyins.io.yaml_document import Document, read_yaml, write_yaml
 from polyins.loading import load
 
 RADIUS = 0.29
@@ -154,3 +157,12 @@ def test_a_recording_without_wheels_is_refused(files: Path) -> None:
     result = command(write(files, "body.yaml", values))
     assert isinstance(result.exception, InputError)
     assert not (files / "body-calibrated.yaml").exists()
+
+
+def test_what_the_drive_hardly_tells_stays_as_configured() -> None:
+    """The body's yaw on a robot that hardly accelerates, say."""
+    estimate = Estimate("mount_deg", (1.0, 2.0, 7.0), (0.5, 0.2, 17.0), (0.0, 0.1, 0.2))
+    calibration = Calibration({"body": (estimate,)}, "", (), ())
+    values = {"imus": [{"name": "body", "file": "body.csv", "mount_deg": [0.0, 0.1, 0.2]}]}
+    text = calibrated(values, parse(Document(Path("drive.yaml"), values)), calibration)
+    assert "mount_deg: [1.0, 2.0, 0.2]" in text

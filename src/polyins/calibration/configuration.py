@@ -14,12 +14,14 @@ from polyins.recording import Offset
 
 Values = dict[str, Any]
 DIGITS = 7
+WEAKEST = {"mount_deg": 1.5}
+"""A component whose std is larger than this does not take the place of what was configured."""
 
 
 def calibrated(values: Values, config: Config, calibration: Calibration, folder: Path | None = None) -> str:
     """Return `values`, what a configuration says, as YAML with the estimates in the place of what was there.
 
-    `config`: the same, filled in. With `folder` relative file names are put into it, so that the text may stand in
+    `config`: the same, filled in. Components that the drive hardly tells (`WEAKEST`) stay as they are. With `folder` relative file names are put into it, so that the text may stand in
     another one. Clock offsets that were found take the place of `time_offset: estimate`.
     """
     new = deepcopy(values)
@@ -45,7 +47,15 @@ def _put(raw: Values, estimate: Estimate) -> None:
     *sections, key = estimate.key.split(".")
     for section in sections:
         raw = raw.setdefault(section, {})
-    raw[key] = _plain(estimate.value)
+    raw[key] = _plain(_believed(key, estimate))
+
+
+def _believed(key: str, estimate: Estimate) -> tuple[float, ...] | str:
+    """Return the estimate, but what was configured where the drive hardly tells."""
+    value, std, configured = estimate.value, estimate.std, estimate.configured
+    if key not in WEAKEST or std is None or isinstance(value, str) or isinstance(configured, str):
+        return value
+    return tuple(v if s <= WEAKEST[key] else c for v, s, c in zip(value, std, configured, strict=True))
 
 
 def _plain(value: tuple[float, ...] | str) -> Any:

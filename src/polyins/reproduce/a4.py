@@ -20,7 +20,7 @@ PAPER_S = {"single": 4.67, "imu-fusion": 5.00, "nav-fusion": 75.00, "enav-fusion
 """for 1,000 s at 200 Hz, rms over four groups"""
 EPOCHS = 200_000
 ROUNDS, SECONDS = 5, 100.0
-QUICK_ROUNDS, QUICK_SECONDS = 3, 63.0
+QUICK_ROUNDS, QUICK_SECONDS = 3, 80.0
 
 CASES: tuple[bench.Case, ...] = tuple(
     (f"{'dense/' if dense else ''}{name}", name, count, dense)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polyins.recording import ImuStream
 from polyins.rig import DEG
-from polyins.simulation.error_scenario import ChipCalibration
+from polyins.simulation.error_scenario import IDENTITY, ChipCalibration, Matrix
 
 Array = NDArray[np.float64]
 Chips = tuple[ChipCalibration, ...]
@@ -39,6 +39,21 @@ def read_chips(folder: Path) -> Chips:
 def draw_chips(count: int, rng: np.random.Generator) -> Chips:
     """Draw chips from the statistics of Group 1's."""
     return tuple(_draw(rng) for _ in range(count))
+
+
+def parts_of(chips: Chips) -> dict[str, Chips]:
+    """Return the chips with their offsets only, with their scale factors too, and whole."""
+    bare = tuple(chip.model_copy(update={"gyro_matrix": IDENTITY, "accel_matrix": IDENTITY}) for chip in chips)
+    scaled = tuple(
+        chip.model_copy(update={name: _diagonal(getattr(chip, name)) for name in ("gyro_matrix", "accel_matrix")})
+        for chip in chips
+    )
+    return {"offsets": bare, "scale factors": scaled, "axes": chips}
+
+
+def _diagonal(matrix: Matrix) -> Matrix:
+    (xx, _, _), (_, yy, _), (_, _, zz) = matrix
+    return (xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz)
 
 
 def _draw(rng: np.random.Generator) -> ChipCalibration:
@@ -73,6 +88,7 @@ def compensate(stream: ImuStream, calibration: ChipCalibration) -> ImuStream:
     return ImuStream(
         stream.name,
         stream.time,
-        stream.dtheta @ chip.gyro.matrix.T + chip.gyro.offset * interval,
-        stream.dvel @ chip.accel.matrix.T + chip.accel.offset * interval,
+        # a matrix product would wake every BLAS thread for a 3 x 3 matrix
+        np.einsum("ij,tj->ti", chip.gyro.matrix, stream.dtheta) + chip.gyro.offset * interval,
+        np.einsum("ij,tj->ti", chip.accel.matrix, stream.dvel) + chip.accel.offset * interval,
     )

@@ -30,7 +30,8 @@ Array = NDArray[np.float64]
 DATASET = "whu-array"
 FIRST, LAST = 270769.0, 273689.0
 """s of week: 60 s before the car first moves, and the end of the last outage"""
-QUICK_S = 490.0
+QUICK_S = 1300.0
+QUICK_RATE_HZ = 20.0
 
 INITIAL_STD = ImuErrors(
     gyro_bias=np.full(3, 50.0 / 3600.0 * DEG),
@@ -48,10 +49,10 @@ STATED_STD = np.array([0.013, 0.010, 0.023])
 
 
 def base_scenario(quick: bool) -> Scenario:
-    """Return the scenario of the file, shorter if `quick`."""
+    """Return the scenario of the file, shorter and slower if `quick`."""
     with resources.as_file(resources.files("polyins.reproduce") / "a3.yaml") as file:
         scenario = read_scenario(file)
-    return scenario.model_copy(update={"duration_s": QUICK_S}) if quick else scenario
+    return scenario.model_copy(update={"duration_s": QUICK_S, "rate_hz": QUICK_RATE_HZ}) if quick else scenario
 
 
 def real_chips() -> Chips | None:

@@ -22,7 +22,8 @@ Document = dict[str, Any]
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> Document:
     """Run eNav-Fusion of one to four IMUs in the scenario of a3 and over the real flights, and return the document.
 
-    `quick` takes the first two outages and every fourth flight. Without the data set `quadrotor` the flights are null.
+    `quick` takes the first eleven outages and every fourth flight. The flights are null without the data set
+    `quadrotor`.
     """
     steps = Steps(progress, 2)
     scenario = rigid_array.base_scenario(quick)

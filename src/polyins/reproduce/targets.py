@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from polyins.errors import InputError
-from polyins.screen import number, print_table
+from polyins.screen import number, print_table, say
 
 Document = dict[str, Any]
 
-TARGETS = ("flights", "wid", "array", "consistency")
+TARGETS = ("flights", "wid", "array", "consistency", "a1", "a2", "a3", "a4", "afig3", "split")
 """Each is a module of this package with a function `reproduce(quick, progress)`."""
-WITH_REPORTS = ("wid",)
+WITH_REPORTS = ("wid", "a3", "afig3")
 """Those whose function also takes `out`, the folder for reports."""
 
 
@@ -34,9 +34,14 @@ def find_target(name: str, out: Path) -> Callable[[bool, Callable[[float], None]
 
 
 def print_document(document: Document) -> None:
-    """Print every figure of a document, one per row, named by its path."""
-    rows = [[path, value] for path, value in _leaves(document["polyins"])]
-    print_table(document["target"], ["figure", "polyins"], rows)
+    """Print every figure of a document, one per row, named by its path, with the paper's beside it; then its words."""
+    published = dict(_leaves(document["paper"]))
+    figures = dict(_leaves(document["polyins"]))
+    rows = [[path, published.get(path, "-"), figures.get(path, "-")] for path in dict.fromkeys([*figures, *published])]
+    print_table(document["target"], ["figure", "paper", "polyins"], rows)
+    for value in document["polyins"].values():
+        if isinstance(value, str):
+            say(value)
 
 
 def _leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:
@@ -45,5 +50,5 @@ def _leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:
             yield from _leaves(item, f"{path} / {key}" if path else str(key))
     elif isinstance(value, list):
         yield path, ", ".join(number(item) for item in value)
-    else:
+    elif not isinstance(value, str):
         yield path, str(value) if isinstance(value, int) else number(value if isinstance(value, float) else None, 3)

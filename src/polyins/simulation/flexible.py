@@ -43,7 +43,7 @@ class Ruler:
     @property
     def nominal(self) -> Array:
         """Where the IMU is nominally, in the array frame, m, shape (3,)."""
-        return self.tip - np.array([0.0, 0.0, self.beam.tip_height])
+        return np.asarray(self.tip - np.array([0.0, 0.0, self.beam.tip_height]))
 
     @property
     def bending_rate(self) -> float:

@@ -51,7 +51,7 @@ def interpolation() -> Array:
 def smooth_rates(path: Path, count: int, interval: float) -> Array:
     """Return w_ip^p, f(0), A of a path at the ends of `count` intervals, and one before and after, (count + 3, 15).
 
-    A path turns and speeds up over seconds: a cubic between these ends is exact to 1e-9 rad/s and m/s^2.
+    A path turns and speeds up over seconds: a cubic between these ends is exact to 1e-8 rad/s and 1e-7 m/s^2.
     """
     time = interval * np.arange(-1.0, count + 2.0)
     parts = []

@@ -210,7 +210,8 @@ def _calibrated(imu: Imu, scenario: Scenario, errors: TrueErrors) -> Imu:
 def _start(scenario: Scenario, run: TrueRun) -> StartOptions:
     """Return what is known of the start: when it stands, and with nothing but wheels to go by where and how.
 
-    A robot that goes to and fro is too slow for a course to show its heading: a reference gives it, as in paper A. B's lab starts from its reference, and from these standard deviations.
+    A robot that goes to and fro is too slow for its course to show the heading, so a reference gives it, as in paper A.
+    Paper B's lab starts from its reference, and from these standard deviations.
     """
     still = (float(run.body.time[0]), scenario.static_s)
     interval = still if still[0] < still[1] else None

@@ -59,7 +59,7 @@ class Shaking:
 
 def shake(path: Path, ground: Ground, suspension: Suspension, step: float) -> Shaking:
     """Return what the ground does to the body of a robot that drives over it along a path."""
-    time = step * np.arange(int(np.ceil(path.duration / step)) + 1)
+    time = step * np.arange(np.ceil(path.duration / step) + 1.0)
     along = way(path, time)
     half = suspension.wheelbase / 2.0
     front, rear = ground(along + half), ground(along - half)
