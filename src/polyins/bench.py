@@ -40,7 +40,7 @@ CASES: tuple[Case, ...] = (
 def bench(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     """Return the `bench` document: CPU time per epoch, compilation left out.
 
-    IMUs at 200 Hz; arrays with GNSS at 1 Hz, vehicles without, with wheel speed at 2 Hz and the reference point at 1 Hz.
+    IMUs at 200 Hz; arrays with GNSS at 1 Hz; vehicles with wheel speed at 2 Hz and the reference point at 1 Hz.
 
     The cases take turns, and each ratio is the median of those within a round, so that a change in the machine's
     speed does not enter.

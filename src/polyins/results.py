@@ -50,7 +50,8 @@ def write_run(folder: Path, recording: Recording, solution: Solution, summary: D
 def write_comparison(folder: Path, recording: Recording, result: Comparison, report: bool = True) -> None:
     """Write a folder per method and what compares them.
 
-    Below `single` (with wheels `wheel-ins`), which holds the first IMU's solution and the figures over all, each IMU has a folder of its name.
+    Below `single` (with wheels `wheel-ins`), which holds the first IMU's solution and the figures over all, each IMU
+    has a folder of its name.
     """
     summaries = result.document["methods"]
     alone = "wheel-ins" if recording.rig.rolling else "single"

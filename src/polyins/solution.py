@@ -66,8 +66,8 @@ class Solution:
     """shape (K, N, 12)"""
     innovations: Innovations
     mounting: Array | None = None
-    """with wheels: estimated relative error of the wheel speed, and of a wheel's lever arm y and z (m) or of a body's mount
-    pitch and yaw (rad), shape (K, N, 3)"""
+    """with wheels: estimated relative error of the wheel speed, and of a wheel's lever arm y and z (m) or of a body's
+    mount pitch and yaw (rad), shape (K, N, 3)"""
     mounting_std: Array | None = None
     """shape (K, N, 3); zero where it is not estimated"""
     faults: tuple[str, ...] = ()

@@ -307,7 +307,10 @@ def _aid_all(
 def _speaks(s: int, rolling: Rolling) -> bool:
     """Whether neither the share is silent nor the one that lends roll and pitch to it."""
     lender = rolling.lenders[s]
-    return rolling.silent[s] < 0.0 and (lender < 0 or rolling.silent[lender] < 0.0)
+    if lender >= 0 and rolling.silent[lender] >= 0.0:
+        return False
+    speaks: bool = rolling.silent[s] < 0.0
+    return speaks
 
 
 @kernel

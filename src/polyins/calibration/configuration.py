@@ -21,8 +21,9 @@ WEAKEST = {"mount_deg": 1.5}
 def calibrated(values: Values, config: Config, calibration: Calibration, folder: Path | None = None) -> str:
     """Return `values`, what a configuration says, as YAML with the estimates in the place of what was there.
 
-    `config`: the same, filled in. Components that the drive hardly tells (`WEAKEST`) stay as they are. With `folder` relative file names are put into it, so that the text may stand in
-    another one. Clock offsets that were found take the place of `time_offset: estimate`.
+    `config`: the same, filled in. Components that the drive hardly tells (`WEAKEST`) stay as they are. With `folder`
+    relative file names are put into it, so that the text may stand in another one. Clock offsets that were found take
+    the place of `time_offset: estimate`.
     """
     new = deepcopy(values)
     found = {offset.name: offset for offset in calibration.clock_offsets}

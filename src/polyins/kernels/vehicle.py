@@ -47,7 +47,7 @@ def on_body(c: Matrix, pitch: float, yaw: float) -> Matrix:
     angle = math.sqrt(square)
     s, k = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
     cosine = 1.0 - k * square
-    out = (
+    return (
         cosine * c[0] - s * yaw * c[1] + s * pitch * c[2],
         s * yaw * c[0] + (1.0 - k * yaw * yaw) * c[1] + k * pitch * yaw * c[2],
         -s * pitch * c[0] + k * pitch * yaw * c[1] + (1.0 - k * pitch * pitch) * c[2],
@@ -58,7 +58,6 @@ def on_body(c: Matrix, pitch: float, yaw: float) -> Matrix:
         s * yaw * c[6] + (1.0 - k * yaw * yaw) * c[7] + k * pitch * yaw * c[8],
         -s * pitch * c[6] + k * pitch * yaw * c[7] + (1.0 - k * pitch * pitch) * c[8],
     )
-    return out
 
 
 @kernel
