@@ -364,14 +364,15 @@ class _RollingSearch(_Search):
         imus = self.recording.rig.imus
         self.imu_attitudes = np.zeros((len(imus), 3))
         given = self.options.roll_pitch
-        if given is not None:
-            self.sources["roll_pitch"] = "given"
-            self.imu_attitudes[:, :2] = given
-        elif still:
+        if still:
             self.sources["roll_pitch"] = "levelled at standstill"
             for i, force in enumerate(self._mean(*still)[1]):
                 self.imu_attitudes[i, :2] = level(force)
-        else:
+        if given is not None:
+            # at a standstill of the vehicle, whose wheels may have any angle; else of each IMU itself
+            self.sources["roll_pitch"] = "given"
+            self.imu_attitudes[[not still or imu.wheel is None for imu in imus], :2] = given
+        elif not still:
             raise InputError(
                 "start: no standstill of three seconds; a vehicle with wheels starts at one:"
                 " expected start.static_interval_s or start.roll_pitch_deg"

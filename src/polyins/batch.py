@@ -109,7 +109,18 @@ def run(
         filter_s += clock.thread_time() - begin
         if progress:
             progress(last / epochs)
+    if prepared.rolling is not None:
+        _check_finite(prepared)
     return _solution(prepared, filter_s, first_call_s)
+
+
+def _check_finite(run: Prepared) -> None:
+    broken = np.flatnonzero(~np.isfinite(run.outputs.states[1:]).all(axis=1))
+    if len(broken):
+        raise InputError(
+            f"{run.method.name}: diverged at {run.aligned.time[1:][broken[0]]:.2f} s;"
+            " expected wheel radii, mounts, clocks and a start heading that fit the motion"
+        )
 
 
 def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance: bool = False) -> Prepared:

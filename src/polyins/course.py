@@ -52,7 +52,7 @@ def find(recording: Recording, navigate: Callable[[Recording], Solution]) -> Cou
     blind = replace(recording.start, heading=0.0, heading_from="value", position=origin)
     solution = navigate(replace(recording, gnss=None, outages=(), start=blind))
     track, fixes = _pairs(recording, gnss, solution)
-    reach = float(np.max(np.linalg.norm(track, axis=1), initial=0.0))
+    reach = float(np.max(np.linalg.norm(track - track[:1], axis=1), initial=0.0))
     if reach < SHORTEST:
         raise InputError(
             f"start: no heading: the vehicle goes {reach:.1f} m while there is GNSS;"
@@ -76,6 +76,8 @@ def _pairs(recording: Recording, gnss: GnssStream, solution: Solution) -> tuple[
     far = np.flatnonzero(np.linalg.norm(way[:, :2], axis=1) > LENGTH)
     end = solution.time[far[0]] if len(far) else solution.time[-1]
     shown = (gnss.time >= solution.time[0]) & (gnss.time <= end)
+    for first, last in recording.outages:
+        shown &= ~((gnss.time > first) & (gnss.time < last))
     fixes = displacement(gnss.position[shown], gnss.position[0], recording.geodetic)[:, :2]
     track = np.column_stack([np.interp(gnss.time[shown], solution.time, way[:, k]) for k in range(2)])
     return track, fixes

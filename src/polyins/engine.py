@@ -216,28 +216,36 @@ def aid_by_position(
         state.counters[1] += 1
         if state.counters[1] <= plan.reopen_after:
             return REJECTED
-        _reopen(state, plan, nis)
-        if joined is not None:
-            _reopen_all(state, nis, joined)
+        if joined is None:
+            _reopen(state, plan, nis, rolling)
+        else:
+            _reopen_all(state, plan, nis, joined)
         status = REOPENED
     state.counters[1] = 0
     if origin is not None:
         _correct(state)
     if rolling is not None:
         dt = state.clock[1]
-        wheels.correct_by_position(blocks, groups, members, measurements, state.near, rolling, joined, dt)
+        now = state.clock[0]
+        wheels.correct_by_position(blocks, groups, members, measurements, state.near, rolling, joined, now, dt)
     return status
 
 
 @kernel
-def _reopen_all(state: State, nis: float, joined: Joint) -> None:
-    """Let the joined covariance grow as `_reopen` lets that of a share."""
+def _reopen_all(state: State, plan: Plan, nis: float, joined: Joint) -> None:
+    """Let the joined covariance grow as `_reopen` lets that of a share; a jump is one for all shares."""
     growth = min(nis / 3.0, MOST_GROWTH)
-    m = state.measurements[0]
+    m, shares = state.measurements[0], state.members.shape[0]
     for i in range(joined.whole.shape[0]):
         for j in range(joined.whole.shape[0]):
             joined.whole[i, j] *= growth
     joint.gain(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, m)
+    if kalman.normalized_innovation_squared(m) > plan.gate_limit:
+        for a in range(3):
+            for s in range(shares):
+                for t in range(shares):
+                    joined.whole[s * share.STATES + a, t * share.STATES + a] += m[kalman.RESIDUAL + a] ** 2
+        joint.gain(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, m)
 
 
 @kernel
@@ -296,7 +304,7 @@ def _record(state: State, nis: float, innovation: Array, rolling: Rolling | None
 
 
 @kernel
-def _reopen(state: State, plan: Plan, nis: float) -> None:
+def _reopen(state: State, plan: Plan, nis: float, rolling: Rolling | None) -> None:
     """Let the covariance grow until the fix is believable.
 
     The filter is surer of itself than it should be, in velocity and attitude as much as in position, so P is scaled
@@ -304,6 +312,8 @@ def _reopen(state: State, plan: Plan, nis: float) -> None:
     """
     growth = min(nis / 3.0, MOST_GROWTH)
     for s in range(state.members.shape[0]):
+        if not _has_measured(s, rolling, None):
+            continue
         g, m = state.groups[s], state.measurements[s]
         for i in range(share.STATES * share.STRIDE):
             g[share.P + i] *= growth
@@ -488,15 +498,16 @@ def run_epochs(
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
         fraction = (end - now) / interval
         propagate(blocks, groups, members, near, clock, shared, fraction, end - now, work, origin, rolling, joined)
+        if rolling is not None:
+            measurements = state.measurements
+            wheels.watch(k, fraction, blocks, groups, members, rolling, end - now)
+            if rolling.present.shape[0] > 0:
+                wheels.carry(k, end, blocks, groups, members, near, rolling, joined, interval)
+            wheels.step(k, end, blocks, groups, members, measurements, near, rolling, joined, end - now, interval)
         while next_fix <= end + snap:
             if fixes is not None:
                 aid(state, plan, fixes, outputs, inputs.velocities, origin, rolling, joined)
             next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
-        if rolling is not None:
-            measurements = state.measurements
-            if rolling.present.shape[0] > 0:
-                wheels.carry(k, end, blocks, groups, members, near, rolling, joined, interval)
-            wheels.step(k, end, blocks, groups, members, measurements, near, rolling, joined, interval)
         write(groups, members, states, variances, k)
         if (k - 1) % plan.log_every == 0:
             _log(state, outputs, end)

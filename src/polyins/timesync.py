@@ -12,6 +12,8 @@ from polyins.recording import ImuStream
 
 Array = NDArray[np.float64]
 
+LATE_END = 1.0  # s
+
 GAP = 3.5
 """An interval longer than this many nominal ones is a gap: what was measured in it is lost."""
 
@@ -48,7 +50,7 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
     of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Raises InputError if less
     than two seconds are common.
     """
-    time = _common_time(streams)
+    time = _common_time(streams, bridge)
     increments = np.empty((len(time), 6, len(streams)))
     missing = np.zeros((len(time), len(streams)), dtype=bool)
     warnings: list[str] = []
@@ -60,6 +62,9 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
             increments[:, :, i] = _resample(stream.time, values, time)
         gaps = _gaps(stream.time)
         gaps = [g for g in gaps if g[1] > time[0] and g[0] < time[-1]]
+        stops = float(stream.time[-1])
+        if time[-1] - stops > LATE_END:
+            gaps.append((stops, float(time[-1])))
         for begin, end in gaps:
             missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
         if gaps:
@@ -73,16 +78,28 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
     return Aligned(time, increments, tuple(warnings), missing)
 
 
-def _common_time(streams: tuple[ImuStream, ...]) -> Array:
+def _common_time(streams: tuple[ImuStream, ...], bridge: bool) -> Array:
+    """Return the stamps of the stream with the fewest gaps, filled up in them with those of others.
+
+    Without `bridge` the time goes on where a stream ends for good while others go on.
+    """
     begin = max(stream.time[0] for stream in streams)
-    end = min(stream.time[-1] for stream in streams)
-    if end - begin < 2.0:
+    ends = np.array([stream.time[-1] for stream in streams])
+    end = float(ends.min() if bridge else ends[ends > ends.max() - LATE_END].min())
+    if min(end, ends.min()) - begin < 2.0:
         spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
         raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
     # the first whose gaps are few: a gap in the base is one for all
-    base = min(streams, key=lambda stream: len(_gaps(stream.time))).time
-    common: Array = base[(base >= begin) & (base <= end)]
-    return common
+    ordered = sorted(streams, key=lambda stream: (len(_gaps(stream.time)), stream.time[-1] < end))
+    base: Array = ordered[0].time[(ordered[0].time >= begin) & (ordered[0].time <= end)]
+    nominal = float(np.median(np.diff(base)))
+    for stream in ordered[1:]:
+        parts = [base]
+        for first, last in [*_gaps(base), *([(base[-1], end + nominal)] if end - base[-1] > GAP * nominal else [])]:
+            inside = (stream.time > first + 0.5 * nominal) & (stream.time < last - 0.5 * nominal)
+            parts.append(stream.time[inside])
+        base = np.sort(np.concatenate(parts))
+    return base
 
 
 def _resample(stamps: Array, values: Array, time: Array) -> Array:

@@ -67,7 +67,7 @@ def test_rates_and_forces_are_derivatives_of_the_pose():
     path = shuttle(12.0)
     shaking = lawn(path)
     flexing = flex(RIGHT, shaking, 9.79)
-    dtheta, dvel = moving_increments(smooth_rates(path, 2400, 0.005), RIGHT, flexing, shaking)
+    _, dvel = moving_increments(smooth_rates(path, 2400, 0.005), RIGHT, flexing, shaking)
     samples = np.arange(16000, 16200)
     relative = [moved(RIGHT, flexing, shaking, n) for n in samples]
     C_ps, w, u, speed = (np.array(values) for values in zip(*relative, strict=True))

@@ -219,6 +219,9 @@ def _teach_all(
 
     `z` is the residual. A member of the share `measured` differs from its mean by its own.
     """
+    for s in range(members.shape[0]):
+        if rolling.silent[s] >= 0.0:
+            joined.gain[:, s * STATES : (s + 1) * STATES] = 0.0
     joint.update(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, joined.ah)
     k = joined.gain
     for s in range(members.shape[0]):
@@ -387,6 +390,32 @@ def _end_window(
 
 
 @kernel
+def watch(k: int, fraction: float, blocks: Array, groups: Array, members: Array, rolling: Rolling, dt: float) -> None:
+    """Add what was travelled in the last `dt` seconds, this fraction of epoch k, where a speed is being taken."""
+    memory = rolling.memory
+    if memory[WATCHED] < 0.0:
+        return
+    memory[WATCHED] += fraction
+    memory[TRAVEL] += fraction * rolling.travel[k, 0]
+    for s in range(members.shape[0]):
+        lent = vehicle.lent_matrix(groups, rolling.lenders[s])
+        for i in range(members[s, 0], members[s, 1] if rolling.silent[s] < 0.0 else 0):
+            wheel_speed.watch(blocks[i // LANES], i % LANES, lent, memory[LATERAL], dt)
+
+
+@kernel
+def open_window(now: float, lateral: float, blocks: Array, groups: Array, members: Array, rolling: Rolling) -> None:
+    """Begin to take a speed."""
+    memory = rolling.memory
+    memory[WATCHED] = memory[TRAVEL] = 0.0
+    memory[OPENED], memory[LATERAL] = now, lateral
+    for s in range(members.shape[0]):
+        lent = vehicle.lent_matrix(groups, rolling.lenders[s])
+        for i in range(members[s, 0], members[s, 1] if rolling.silent[s] < 0.0 else 0):
+            wheel_speed.open_window(blocks[i // LANES], i % LANES, lent, lateral)
+
+
+@kernel
 def step(
     k: int,
     now: float,
@@ -398,27 +427,16 @@ def step(
     rolling: Rolling,
     joined: Joint | None,
     dt: float,
+    interval: float,
 ) -> None:
-    """Do what is due at epoch k, at time `now`, whose interval took `dt` seconds."""
+    """Do what is due at epoch k, at time `now`; `dt` is the part of its interval that was navigated last."""
     memory, settings = rolling.memory, rolling.settings
-    half = 0.5 * dt
-    if memory[WATCHED] >= 0.0:
-        memory[WATCHED] += 1.0
-        memory[TRAVEL] += rolling.travel[k, 0]
-        for s in range(members.shape[0]):
-            lent = vehicle.lent_matrix(groups, rolling.lenders[s])
-            for i in range(members[s, 0], members[s, 1] if rolling.silent[s] < 0.0 else 0):
-                wheel_speed.watch(blocks[i // LANES], i % LANES, lent, memory[LATERAL], dt)
-        if now - memory[LAST_SPEED] >= settings[SPEED_INTERVAL] - half:
-            _end_window(now, blocks, groups, members, measurements, near, rolling, joined, dt)
-            memory[WATCHED] = -1.0
+    half = 0.5 * interval
+    if memory[WATCHED] > 0.0 and now - memory[LAST_SPEED] >= settings[SPEED_INTERVAL] - half:
+        _end_window(now, blocks, groups, members, measurements, near, rolling, joined, dt)
+        memory[WATCHED] = -1.0
     if memory[WATCHED] < 0.0 and now - memory[LAST_SPEED] >= settings[SPEED_INTERVAL] - settings[SPEED_WINDOW] - half:
-        memory[WATCHED] = memory[TRAVEL] = 0.0
-        memory[OPENED], memory[LATERAL] = now, rolling.travel[k, 1]
-        for s in range(members.shape[0]):
-            lent = vehicle.lent_matrix(groups, rolling.lenders[s])
-            for i in range(members[s, 0], members[s, 1] if rolling.silent[s] < 0.0 else 0):
-                wheel_speed.open_window(blocks[i // LANES], i % LANES, lent, memory[LATERAL])
+        open_window(now, rolling.travel[k, 1], blocks, groups, members, rolling)
     if members.shape[0] > 1 and now - memory[LAST_POINT] >= settings[POINT_INTERVAL] - half:
         memory[LAST_POINT] = now
         variance = settings[POINT_VARIANCE]
@@ -660,6 +678,7 @@ def correct_by_position(
     near: Array,
     rolling: Rolling,
     joined: Joint | None,
+    now: float,
     dt: float,
 ) -> None:
     """Apply the GNSS position that was measured."""
@@ -670,4 +689,5 @@ def correct_by_position(
         _teach_all(-1, m[kalman.RESIDUAL : kalman.RESIDUAL + 3], blocks, members, rolling, joined, m)
         _end_teaching(blocks, groups, members, near, rolling, joined, dt)
     # what was watched before the states were corrected does not fit them any more
-    rolling.memory[WATCHED] = -1.0
+    if rolling.memory[WATCHED] >= 0.0:
+        open_window(now, rolling.memory[LATERAL], blocks, groups, members, rolling)

@@ -7,23 +7,33 @@ other; `candidates` makes one of them larger, to see which could make what was m
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from polyins import batch
+from polyins.evaluation.errors import compare_to_reference
+from polyins.recording import Recording
 from polyins.reproduce import rigid_array
 from polyins.reproduce.chips import Chips, parts_of
-from polyins.reproduce.pictures import bars, write_figure
+from polyins.reproduce.pictures import bars, lines, write_figure
 from polyins.reproduce.progress import Steps
 from polyins.simulation.error_scenario import Errors
-from polyins.simulation.run import TrueRun
+from polyins.simulation.run import TrueRun, record
 
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
 GROUPS = (1, 2, 3, 4)
 QUICK_GROUPS = (1,)
-SEED = 0
+SEEDS = (0, 1, 2, 3)
+QUICK_SEEDS = (0,)
 """of sources and candidates"""
+POINTS = 6000
+"""of a curve in a picture, at most"""
+EXACT_M = (1e-4, 1e-4, 1e-4)
+"""std of fixes that take nothing from the gain"""
 
 PAPER = {
     "group1": (5.68, 1.98, 1.97, 2.05),
@@ -34,6 +44,8 @@ PAPER = {
 }
 """m: single and the three methods"""
 PAPER_RATIO = 2.51
+SINGLES = (4.87, 6.98)
+"""m: the paper's and the lab's single IMU"""
 LAB = {"single": 6.98, "uncompensated": 4.25, "compensated": 1.92}
 """m: the same lab's figures for Group 1's 30 s outages, an IMU-level array; see the data set's README"""
 
@@ -54,6 +66,10 @@ CANDIDATES: Mapping[str, Mapping[str, float]] = {
 }
 """One source after the other at the upper end of what is plausible."""
 UNAWARE = "filter told 250 mGal of offset"
+STATED = "fixes as noisy as they state"
+LATE_S = 4.0
+LATE = f"standstill taken {LATE_S:g} s too long"
+"""The first biases and velocity are then wrong alike for all IMUs."""
 
 Document = dict[str, Any]
 
@@ -67,7 +83,7 @@ def reproduce(
     """
     scenario = rigid_array.base_scenario(quick)
     groups = QUICK_GROUPS if quick else GROUPS
-    steps = Steps(progress, 2 * len(groups) + 5 + len(SOURCES) + (0 if quick else len(CANDIDATES) + 1))
+    steps = Steps(progress, 2 * len(groups) + 5 + len(SOURCES) + (0 if quick else len(CANDIDATES) + 4))
     run = rigid_array.drive(scenario)
     errors = scenario.errors
     tables: dict[str, dict[str, dict[str, float]]] = {"uncompensated": {}, "compensated": {}}
@@ -78,20 +94,23 @@ def reproduce(
         recording = rigid_array.compensated(recording, chips)
         tables["compensated"][f"group{number}"] = rigid_array.figures(recording, METHODS, steps.next())
     chips = rigid_array.group_chips(1, scenario.imus.count)
-    sources = add_sources(run, errors, chips, steps)
-    candidates = {} if quick else try_candidates(run, errors, chips, steps)
+    seeds = QUICK_SEEDS if quick else SEEDS
+    sources = add_sources(run, errors, chips, seeds, steps)
+    candidates = {} if quick else try_candidates(run, errors, chips, seeds, steps)
     if out is not None:
         write_figure(sources_figure(sources, scenario.imus.count), out / "a3-sources.html")
+        shown = rigid_array.recording_of(with_chips(run, errors, chips), seed=1)
+        write_figure(error_figure(shown), out / "a3-errors.html")
     return {
         "target": "a3",
         "paper": {
-            "uncompensated": table(
-                {name: dict(zip(("single", *METHODS), row, strict=True)) for name, row in PAPER.items()}
+            "uncompensated": with_spread(
+                table({name: dict(zip(("single", *METHODS), row, strict=True)) for name, row in PAPER.items()})
             ),
             "compensated": {"group1": {"single": LAB["single"], "imu-fusion": LAB["compensated"]}},
         },
         "polyins": {
-            **{name: table({**rows, "rms": pooled(rows)}) for name, rows in tables.items()},
+            **{name: with_spread(table({**rows, "rms": pooled(rows)})) for name, rows in tables.items()},
             "sources": sources,
             "candidates": candidates,
             "largest_difference_of_methods": largest_difference(tables["uncompensated"]),
@@ -101,7 +120,8 @@ def reproduce(
             "track": rigid_array.provenance(),
             "outages": len(run.scenario.outage_intervals()),
             "scenario": scenario.model_dump(mode="json", exclude={"track", "wheels"}),
-            "sources": "added one after the other, each with all before it; seed 0, Group 1's chips",
+            "sources": "added one after the other, each with all before it; Group 1's chips",
+            "seeds": seeds,
         },
     }
 
@@ -119,6 +139,15 @@ def table(rows: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, Any]]:
     }
 
 
+def with_spread(rows: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the rows with the standard deviations over the groups."""
+    groups = [row for name, row in rows.items() if name != "rms"]
+    names = ("single", *METHODS)
+    figures = {name: float(np.std([row[name] for row in groups])) for name in names}
+    ratios = {name: float(np.std([row["ratio"][name] for row in groups])) for name in METHODS}
+    return {**rows, "spread": {**figures, "ratio": ratios}}
+
+
 def pooled(rows: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     """Return the rms over the groups."""
     names = next(iter(rows.values()))
@@ -131,48 +160,80 @@ def largest_difference(rows: Mapping[str, Mapping[str, float]]) -> float:
     return max(max(row) / min(row) - 1.0 for row in values)
 
 
-def add_sources(run: TrueRun, errors: Errors, chips: Chips, steps: Steps) -> dict[str, dict[str, float]]:
+def add_sources(
+    run: TrueRun, errors: Errors, chips: Chips, seeds: Sequence[int], steps: Steps
+) -> dict[str, dict[str, float]]:
     """Return single, eNav-Fusion, their ratio and what of the ratio each source takes, added one after the other."""
-    known = Errors(scales=errors.scales)
-    exact = run.scenario.gnss.model_copy(update={"position_std_m": (1e-4, 1e-4, 1e-4)}) if run.scenario.gnss else None
-    blind = TrueRun(run.scenario.model_copy(update={"gnss": exact, "errors": known}), run.path, run.body, (), ())
-    stages = {"white noise and drift": rigid_array.recording_of(blind, SEED, initial_std=None, slow=False)}
-    result = {name: _pair(recording, steps) for name, recording in stages.items()}
-    plain = rigid_array.recording_of(rigid_array.with_errors(run, known), SEED, initial_std=None)
-    result["errors of the fixes"] = _pair(plain, steps)
-    settings: dict[str, Any] = {}
+    known = rigid_array.with_errors(run, Errors(scales=errors.scales))
+    exact = _with_fixes(known, EXACT_M)
+    result = {"white noise and drift": _pooled(lambda seed: record(exact, seed=seed).recording, seeds, steps)}
+    result["errors of the fixes"] = _pooled(
+        lambda seed: rigid_array.with_real_fixes(record(known, seed=seed).recording, seed), seeds, steps
+    )
     given = errors.model_dump()
     for name, part in parts_of(chips).items():
-        settings["chips"] = part
-        result[name] = _pair(_recording(run, known, settings), steps)
+        known = with_chips(run, known.scenario.errors, part)
+        result[name] = _pooled(partial(rigid_array.recording_of, known), seeds, steps)
     for name, keys in SOURCES.items():
-        settings |= {key: given[key] for key in keys}
-        result[name] = _pair(_recording(run, known, settings), steps)
-    ideal = float(np.sqrt(run.scenario.imus.count))
-    before = ideal
+        known = _changed(known, {key: given[key] for key in keys})
+        result[name] = _pooled(partial(rigid_array.recording_of, known), seeds, steps)
+    before = float(np.sqrt(run.scenario.imus.count))
     for row in result.values():
         row["costs"], before = before - row["ratio"], row["ratio"]
     return result
 
 
-def try_candidates(run: TrueRun, errors: Errors, chips: Chips, steps: Steps) -> dict[str, dict[str, float]]:
-    """Return the same with one source larger, and with a filter that is not told of the chips' offsets."""
-    result = {}
-    for name, sizes in CANDIDATES.items():
-        result[name] = _pair(_recording(run, errors, {"chips": chips, **sizes}), steps)
-    unaware = rigid_array.recording_of(with_chips(run, errors, chips), SEED, initial_std=None)
-    result[UNAWARE] = _pair(unaware, steps)
-    return result
+def try_candidates(
+    run: TrueRun, errors: Errors, chips: Chips, seeds: Sequence[int], steps: Steps
+) -> dict[str, dict[str, float]]:
+    """Return the same with one source larger, with a filter told too little, and with a start a little wrong."""
+    own = with_chips(run, errors, chips)
+    makers: dict[str, Callable[[int], Recording]] = {
+        name: partial(rigid_array.recording_of, _changed(own, sizes)) for name, sizes in CANDIDATES.items()
+    }
+    plain, sensitive = partial(rigid_array.recording_of, own), makers["g-sensitivity"]
+    makers[UNAWARE] = lambda seed: _unaware(plain(seed))
+    makers[f"g-sensitivity, and {UNAWARE}"] = lambda seed: _unaware(sensitive(seed))
+    north, east, down = rigid_array.STATED_STD.tolist()
+    makers[STATED] = partial(rigid_array.recording_of, _with_fixes(own, (north, east, down)))
+    makers[LATE] = lambda seed: _late(plain(seed), run.path.static)
+    return {name: _pooled(make, seeds, steps) for name, make in makers.items()}
 
 
-def _recording(run: TrueRun, errors: Errors, settings: Mapping[str, Any]) -> Any:
-    changed = rigid_array.with_errors(run, errors.model_copy(update=dict(settings)))
-    return rigid_array.recording_of(changed, SEED)
+def _changed(run: TrueRun, settings: Mapping[str, Any]) -> TrueRun:
+    return rigid_array.with_errors(run, run.scenario.errors.model_copy(update=dict(settings)))
 
 
-def _pair(recording: Any, steps: Steps) -> dict[str, float]:
-    row = rigid_array.figures(recording, ("enav-fusion",), steps.next())
+def _pooled(make: Callable[[int], Recording], seeds: Sequence[int], steps: Steps) -> dict[str, float]:
+    """Return rms over seeds and outages; each seed lets other IMUs be the single one."""
+    report, every = steps.next(), len(seeds)
+    single, array = [], []
+    for k, seed in enumerate(seeds):
+        recording = make(seed)
+        single += [rigid_array.maxima(recording, "single", imu=i) for i in range(k, len(recording.imus), every)]
+        array.append(rigid_array.maxima(recording, "enav-fusion"))
+        report((k + 1) / every)
+    row = {"single": rigid_array.rms(np.array(single)), "enav-fusion": rigid_array.rms(np.array(array))}
     return {**row, "ratio": row["single"] / row["enav-fusion"]}
+
+
+def _unaware(recording: Recording) -> Recording:
+    """Return the recording for a filter whose first std are those of the drift."""
+    imus = tuple(replace(imu, initial_std=None) for imu in recording.rig.imus)
+    return replace(recording, rig=replace(recording.rig, imus=imus))
+
+
+def _with_fixes(run: TrueRun, std: tuple[float, float, float]) -> TrueRun:
+    """Return the run with fixes of another white noise, m north, east, down."""
+    assert run.scenario.gnss is not None
+    receiver = run.scenario.gnss.model_copy(update={"position_std_m": std})
+    return replace(run, scenario=run.scenario.model_copy(update={"gnss": receiver}))
+
+
+def _late(recording: Recording, static: float) -> Recording:
+    """Return the recording with the first seconds of motion taken for standstill."""
+    interval = (float(recording.imus[0].time[0]), static + LATE_S)
+    return replace(recording, start=replace(recording.start, static_interval=interval))
 
 
 def statement(sources: Mapping[str, Mapping[str, float]], candidates: Mapping[str, Mapping[str, float]]) -> str:
@@ -186,16 +247,43 @@ def statement(sources: Mapping[str, Mapping[str, float]], candidates: Mapping[st
     )
     if not candidates:
         return text
+    nearest = min(candidates, key=lambda name: abs(candidates[name]["ratio"] - PAPER_RATIO))
     worst = max(candidates, key=lambda name: candidates[name]["single"])
-    lowest = min(candidates, key=lambda name: abs(candidates[name]["ratio"] - PAPER_RATIO))
-    return (
-        f"{text} Nearest to the paper's ratio of {PAPER_RATIO}: {lowest} ({candidates[lowest]['ratio']:.2f});"
-        f" nearest to the lab's single IMU of {LAB['single']} m: {worst} ({candidates[worst]['single']:.2f} m)."
+    text += (
+        f" With one thing changed at a time: nearest to the paper's ratio of {PAPER_RATIO} is"
+        f" {nearest} ({candidates[nearest]['ratio']:.2f}); the largest single figure comes from {worst}"
+        f" ({candidates[worst]['single']:.2f} m; the lab's is {LAB['single']} m)."
     )
+    key = "g_sensitivity_deg_s_g"
+    sizes = {figure: size_for(figure, sources, candidates["g-sensitivity"]["single"]) for figure in SINGLES}
+    needed = " and ".join(f"{size:.3f} for {figure} m" for figure, size in sizes.items())
+    return f"{text} {key} would have to be {needed} (plausible: 0.01 to 0.1)."
+
+
+def size_for(figure: float, sources: Mapping[str, Mapping[str, float]], at_most: float) -> float:
+    """Return the g-sensitivity, deg/s/g, that makes a single IMU's figure, m, whose square is linear in its square.
+
+    `at_most` is the figure at the size of `CANDIDATES`; the other point is that of no g-sensitivity.
+    """
+    names = list(sources)
+    without = sources[names[names.index("g-sensitivity") - 1]]["single"] ** 2
+    largest = CANDIDATES["g-sensitivity"]["g_sensitivity_deg_s_g"]
+    return float(largest * np.sqrt(max(figure**2 - without, 0.0) / (at_most**2 - without)))
+
+
+def error_figure(recording: Recording) -> Any:
+    """Return the picture of the array's position error over time, as Fig. 8."""
+    assert recording.reference is not None
+    errors = compare_to_reference(batch.run(recording, "enav-fusion"), recording.reference)
+    every = slice(None, None, max(len(errors.time) // POINTS, 1))
+    time = errors.time[every].tolist()
+    axes = zip(("north", "east", "down"), errors.position[every].T, strict=True)
+    curves = {name: (time, values.tolist()) for name, values in axes}
+    return lines(curves, "time (s)", "eNav-Fusion, Group 1: error (m)", markers=False)
 
 
 def sources_figure(sources: Mapping[str, Mapping[str, float]], imus: int) -> Any:
-    """Return the stacked picture of what each source takes of sqrt(N), and what is left."""
-    left = list(sources.values())[-1]["ratio"]
-    parts = {"left": left, **{name: row["costs"] for name, row in reversed(list(sources.items()))}}
-    return bars({"eNav-Fusion": parts}, f"single / array, of sqrt({imus})", "stack")
+    """Return the stacked picture of what is left of sqrt(N) with each source added, and what all so far have taken."""
+    ideal = float(np.sqrt(imus))
+    columns = {name: {"left": row["ratio"], "taken so far": ideal - row["ratio"]} for name, row in sources.items()}
+    return bars(columns, f"single / array, of sqrt({imus}) = {ideal:.2f}", "stack")

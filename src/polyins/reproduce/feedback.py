@@ -19,12 +19,13 @@ from polyins.kernels.jit import Array, kernel
 from polyins.recording import Recording
 
 
-def outage_maxima(recording: Recording, *, velocity: bool, attitude: bool) -> list[float]:
+def outage_maxima(recording: Recording, *, velocity: bool, attitude: bool) -> NDArray[np.float64]:
     """Return the maximum horizontal error in each outage, m, where velocity or attitude or both are fed back."""
     run = batch.prepare(recording, "enav-fusion")
     fixes = run.inputs.fixes if len(run.inputs.fixes) else None
     run_with_feedback(run.state, run.plan, run.inputs, run.outputs, fixes, run.origin, velocity, attitude)
-    return [_maximum(recording, run.inputs.time, run.outputs.states, outage) for outage in recording.outages]
+    states, time = run.outputs.states, run.inputs.time
+    return np.array([_maximum(recording, time, states, outage) for outage in recording.outages])
 
 
 def _maximum(recording: Recording, time: NDArray[np.float64], states: NDArray[np.float64], outage: Interval) -> float:

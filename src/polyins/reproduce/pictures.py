@@ -36,6 +36,7 @@ def lines(
     y_title: str,
     *,
     logarithmic: bool = False,
+    markers: bool = True,
 ) -> Figure:
     """Return curves by name, each as x and y."""
     from plotly.graph_objects import Figure, Scatter
@@ -43,7 +44,8 @@ def lines(
     figure = Figure()
     for k, (name, (x, y)) in enumerate(curves.items()):
         colour = FEW_IMUS[k % len(FEW_IMUS)]
-        figure.add_trace(Scatter(name=name, x=list(x), y=list(y), mode="lines+markers", line={"color": colour}))
+        mode = "lines+markers" if markers else "lines"
+        figure.add_trace(Scatter(name=name, x=list(x), y=list(y), mode=mode, line={"color": colour}))
     figure.update_xaxes(title_text=x_title, type="log" if logarithmic else "linear")
     figure.update_yaxes(title_text=y_title, type="log" if logarithmic else "linear")
     return finish(figure, HEIGHT)

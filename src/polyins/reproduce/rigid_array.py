@@ -14,7 +14,7 @@ from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
 from polyins.evaluation.outages import outage_statistic
 from polyins.geodesy import metres_per_unit
-from polyins.recording import GnssStream, Recording
+from polyins.recording import Recording
 from polyins.reproduce.chips import Chips, compensate, draw_chips, read_chips
 from polyins.rig import DEG, PPM, ImuErrors
 from polyins.simulation.error_scenario import Errors
@@ -87,7 +87,14 @@ def drive(scenario: Scenario) -> TrueRun:
     path = real_path(scenario.duration_s)
     if path is None:
         return true_run(scenario)
-    fitted = scenario.model_copy(update={"duration_s": path.duration, "path_seed": scenario.seed})
+    fitted = scenario.model_copy(
+        update={
+            "duration_s": path.duration,
+            "static_s": path.static,
+            "path_seed": scenario.seed,
+            "outages": scenario.outage_intervals(),
+        }
+    )
     return TrueRun(fitted, path, increments(path, fitted.rate_hz), (), ())
 
 
@@ -102,25 +109,26 @@ def group_chips(number: int, count: int) -> Chips:
     return real or draw_chips(count, np.random.default_rng([number, 20602]))
 
 
-def recording_of(
-    run: TrueRun, seed: int, *, initial_std: ImuErrors | None = INITIAL_STD, slow: bool = True
-) -> Recording:
-    """Return a recording whose filter knows how far chips may be off at the start.
-
-    `slow`: the fixes have the slow errors, and the stated std, of the real ones.
-    """
-    recording = record(run, seed=seed).recording
-    imus = tuple(replace(imu, initial_std=initial_std) for imu in recording.rig.imus)
-    assert recording.gnss is not None
-    fixes = _with_slow_errors(recording.gnss, np.random.default_rng([seed, 60])) if slow else recording.gnss
-    return replace(recording, rig=replace(recording.rig, imus=imus), gnss=fixes)
+def recording_of(run: TrueRun, seed: int) -> Recording:
+    """Return a recording with fixes like the real ones, whose filter knows how far chips may be off at the start."""
+    return with_real_fixes(with_unknown_chips(record(run, seed=seed).recording), seed)
 
 
-def _with_slow_errors(fixes: GnssStream, rng: np.random.Generator) -> GnssStream:
+def with_unknown_chips(recording: Recording) -> Recording:
+    """Return the recording for a filter that is told `INITIAL_STD`."""
+    imus = tuple(replace(imu, initial_std=INITIAL_STD) for imu in recording.rig.imus)
+    return replace(recording, rig=replace(recording.rig, imus=imus))
+
+
+def with_real_fixes(recording: Recording, seed: int) -> Recording:
+    """Return the recording with the slow errors, and the stated std, of the real fixes besides their white noise."""
+    fixes = recording.gnss
+    assert fixes is not None
     interval = float(np.median(np.diff(fixes.time)))
-    slow = SLOW_STD * gauss_markov(len(fixes.time), interval / SLOW_TIME, rng)[:, :3]
-    position = fixes.position + slow / metres_per_unit(fixes.position, geodetic=True)
-    return replace(fixes, position=position, position_std=np.broadcast_to(STATED_STD, position.shape).copy())
+    drift = gauss_markov(len(fixes.time), interval / SLOW_TIME, np.random.default_rng([seed, 60]))
+    position = fixes.position + SLOW_STD * drift[:, :3] / metres_per_unit(fixes.position, geodetic=True)
+    stated = np.broadcast_to(STATED_STD, position.shape).copy()
+    return replace(recording, gnss=replace(fixes, position=position, position_std=stated))
 
 
 def compensated(recording: Recording, chips: Chips) -> Recording:

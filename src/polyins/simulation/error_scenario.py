@@ -92,7 +92,7 @@ class Errors(Section):
     accel_lsb_mg: NotNegative = 0.0
     """forces are multiples of this, mg; 16 bit over 2 g: 0.061; 0: any"""
     jitter_s: NotNegative = 0.0
-    """std of the instants at which samples are taken about those at which they should be, s; 1e-5 to 1e-3"""
+    """std of the instants at which samples are taken about those at which they should be, s; 1e-5 to 5e-4"""
 
     def imperfections(self) -> Imperfections:
         """Return the same in SI."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from polyins.config import NotNegative, Number, Positive, Section, Triple
+from polyins.config import NotNegative, Number, Pair, Positive, Section, Triple
+from polyins.config.fields import blame
 from polyins.rig import DEG
 from polyins.simulation.cantilever import Cantilever
 from polyins.simulation.flexible import Ruler
@@ -135,7 +136,7 @@ class Road(Section):
 
     roughness_mm: NotNegative = 0.0
     """rms height of the ground, mm"""
-    wavelengths_m: tuple[Positive, Positive] = (0.1, 3.0)
+    wavelengths_m: Pair = (0.1, 3.0)
     """the shortest and the longest, m"""
     correlation: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.5
     """of the ground under left and right wheels"""
@@ -161,6 +162,12 @@ class Road(Section):
     """ratio, of all three"""
     envelope_m: NotNegative = 0.08
     """length over which a tyre averages the ground, m"""
+
+    @model_validator(mode="after")
+    def _wavelengths_are_in_order(self) -> Self:
+        if not 0.0 < self.wavelengths_m[0] < self.wavelengths_m[1]:
+            raise blame("wavelengths_m", f"are {list(self.wavelengths_m)}; expected the shortest, then the longest")
+        return self
 
     def suspension(self) -> Suspension:
         """Return the robot's body on its wheels."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.rig import Vector, zero_vector
+from polyins.simulation.triads import product
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ class ForceResponse:
 
     def gyro(self, dvel: Array) -> Array:
         """Return what velocity increments, m/s, shape (T, 3), add to the gyro's, rad."""
-        return dvel @ self.g_sensitivity.T
+        return product(self.g_sensitivity, dvel)
 
     def accel(self, dvel: Array, vibration: Array, interval: float) -> Array:
         """Return what the squares of force add to the velocity increments, m/s, shape (T, 3).

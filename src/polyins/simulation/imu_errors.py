@@ -20,7 +20,7 @@ from polyins.rig import ImuErrors, NoiseGrade, Vector
 from polyins.simulation.force_response import ForceResponse, draw_force_response
 from polyins.simulation.sampling import jittered, rounded
 from polyins.simulation.shared_noise import SharedNoise, blend
-from polyins.simulation.triads import Chip, skewed, turned
+from polyins.simulation.triads import Chip, product, skewed, turned
 
 Array = NDArray[np.float64]
 
@@ -241,8 +241,8 @@ def _felt(
     dtheta: Array, dvel: Array, errors: TrueErrors, vibration: Array | None, interval: float
 ) -> tuple[Array, Array]:
     """Return the increments along the axes of the triads, with what force does to them."""
-    felt_dtheta = dtheta @ turned(errors.gyro_misalignment).T @ errors.gyro_response.T
-    felt_dvel = dvel @ turned(errors.accel_misalignment).T @ errors.accel_response.T
+    felt_dtheta = product(errors.gyro_response @ turned(errors.gyro_misalignment), dtheta)
+    felt_dvel = product(errors.accel_response @ turned(errors.accel_misalignment), dvel)
     response = errors.force_response
     if np.any(response.g_sensitivity):
         felt_dtheta = felt_dtheta + response.gyro(felt_dvel)

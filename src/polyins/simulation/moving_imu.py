@@ -43,9 +43,7 @@ def interpolation() -> Array:
     Shape (4, FINE_STEPS + 1): what each end weighs.
     """
     at, ends = np.linspace(0.0, 1.0, FINE_STEPS + 1), (-1.0, 0.0, 1.0, 2.0)
-    return np.array(
-        [np.prod([(at - other) / (end - other) for other in ends if other != end], axis=0) for end in ends]
-    )
+    return np.array([np.prod([(at - other) / (end - other) for other in ends if other != end], axis=0) for end in ends])
 
 
 def smooth_rates(path: Path, count: int, interval: float) -> Array:

@@ -28,6 +28,7 @@ from polyins.simulation.path import Path, drive
 from polyins.simulation.rolling import RollingWheel
 from polyins.simulation.shaking import shake, shaken_path
 from polyins.simulation.shared_noise import SharedNoise
+from polyins.simulation.triads import product
 from polyins.simulation.wheels import wheel_increments
 
 if TYPE_CHECKING:
@@ -194,7 +195,7 @@ def _sense(
         shared=shared,
         vibration=scenario.errors.vibration(run.path.speed(time)),
     )
-    stream = ImuStream(imu.name, time, dtheta @ imu.rotation.T, dvel @ imu.rotation.T)
+    stream = ImuStream(imu.name, time, product(imu.rotation, dtheta), product(imu.rotation, dvel))
     return _calibrated(imu, scenario, errors), stream, errors
 
 

@@ -45,6 +45,12 @@ class Chip:
     accel: Calibration = field(default_factory=Calibration)
 
 
+def product(matrix: Array, vectors: Array) -> Array:
+    """Return matrix @ vector of each of the vectors, shape (T, 3)."""
+    # BLAS wakes all its threads for a 3 x 3 matrix, mostly for nothing
+    return vectors if np.array_equal(matrix, np.eye(3)) else vectors @ matrix.T
+
+
 def skewed(angles: Vector) -> Array:
     """Return what maps a vector to its parts along axes that are not square, shape (3, 3).
 

@@ -1,0 +1,73 @@
+"""Paper A, Table VI: what IMUs may share. Sharing the covariance costs nothing; sharing the mechanization does.
+
+Simplification i is eNav-Fusion. For simplification ii the paper feeds the fused state back into the mechanization of
+each IMU; it does not say which part. Here velocity, attitude, and both are fed back (`feedback`), as seen at the array
+origin, on the flexible array of test A and on the same array if it were rigid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.recording import Recording
+from polyins.reproduce import nonrigid
+from polyins.reproduce.feedback import outage_maxima
+from polyins.reproduce.progress import Steps
+from polyins.reproduce.rigid_array import maxima
+
+SEEDS = {"test A": 10, "rigid": 10}
+QUICK_SEEDS = 1
+PAPER = {"test A": {"nav-fusion": 3.12, "enav-fusion": 2.99, "attitude and velocity shared": 4.64}}
+"""m"""
+
+Array = NDArray[np.float64]
+Document = dict[str, Any]
+
+VARIANTS: dict[str, Callable[[Recording], Array]] = {
+    "imu-fusion": lambda recording: maxima(recording, "imu-fusion"),
+    "nav-fusion": lambda recording: maxima(recording, "nav-fusion"),
+    "enav-fusion": lambda recording: maxima(recording, "enav-fusion"),
+    "velocity shared": lambda recording: outage_maxima(recording, velocity=True, attitude=False),
+    "attitude shared": lambda recording: outage_maxima(recording, velocity=False, attitude=True),
+    "attitude and velocity shared": lambda recording: outage_maxima(recording, velocity=True, attitude=True),
+}
+
+
+def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> Document:
+    """Run all variants on both arrays and return the document; `quick` takes one seed, the first 330 s."""
+    seeds = dict.fromkeys(SEEDS, QUICK_SEEDS) if quick else SEEDS
+    steps = Steps(progress, sum(seeds.values()))
+    tables = {test: table(test, count, quick, steps) for test, count in seeds.items()}
+    return {
+        "target": "a6",
+        "paper": {name: with_costs(row) for name, row in PAPER.items()},
+        "polyins": {name: with_costs(row) for name, row in tables.items()},
+        "settings": {
+            "seeds": seeds,
+            "cost": "relative to enav-fusion",
+            "scenarios": {name: nonrigid.scenario_of(name, quick).model_dump(mode="json") for name in seeds},
+        },
+    }
+
+
+def table(test: str, seeds: int, quick: bool, steps: Steps) -> dict[str, float]:
+    """Return the rms over outages and seeds, m, by variant."""
+    scenario = nonrigid.scenario_of(test, quick)
+    found: dict[str, list[Array]] = {name: [] for name in VARIANTS}
+    for number in range(seeds):
+        report = steps.next()
+        recording = nonrigid.recording_of(scenario, number)
+        for name, run in VARIANTS.items():
+            found[name].append(run(recording))
+        report(1.0)
+    return nonrigid.pooled(found)
+
+
+def with_costs(row: dict[str, float]) -> Document:
+    """Return a row with what each kind of sharing adds to the error of eNav-Fusion, relative."""
+    shared = [name for name in row if name.endswith("shared")]
+    return {**row, "cost": {name: row[name] / row["enav-fusion"] - 1.0 for name in shared}}

@@ -1,0 +1,52 @@
+"""Paper A's nonrigid array in simulation: six IMUs on three steel rulers across a robot, on a lawn and over books."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.recording import Recording
+from polyins.reproduce.rigid_array import rms
+from polyins.simulation.run import record, true_run
+from polyins.simulation.scenario import Scenario, read_scenario
+
+Array = NDArray[np.float64]
+
+FIRST_SEED = 1000
+QUICK_S = 330.0
+
+FILES = {"rigid": "lawn.yaml", "test A": "lawn.yaml", "test B": "books.yaml"}
+"""The rigid array is that of test A on rulers that do not bend, on the same lawn."""
+
+
+def scenario_of(test: str, quick: bool) -> Scenario:
+    """Return the scenario of a test, of which `quick` takes the first part."""
+    with resources.as_file(resources.files("polyins.reproduce") / FILES[test]) as file:
+        scenario = read_scenario(file)
+    assert scenario.rulers is not None
+    update: dict[str, Any] = {"rulers": scenario.rulers.model_copy(update={"stiff": test == "rigid"})}
+    if quick:
+        outages = tuple(outage for outage in scenario.outage_intervals() if outage[1] <= QUICK_S)
+        update |= {"duration_s": QUICK_S, "outages": outages}
+    return scenario.model_copy(update=update)
+
+
+def with_roughness(scenario: Scenario, roughness_mm: float) -> Scenario:
+    """Return the scenario on ground of another roughness, rms in mm."""
+    assert scenario.road is not None
+    return scenario.model_copy(update={"road": scenario.road.model_copy(update={"roughness_mm": roughness_mm})})
+
+
+def recording_of(scenario: Scenario, number: int) -> Recording:
+    """Return the recording of the seed of a number, counted from 0: another ground, other rulers, other errors."""
+    seed = FIRST_SEED + number
+    return record(true_run(scenario.model_copy(update={"seed": seed})), seed=seed).recording
+
+
+def pooled(maxima: Mapping[str, Iterable[Array]]) -> dict[str, float]:
+    """Return the rms over all outages of all seeds, m, by method."""
+    return {name: rms(np.concatenate([np.ravel(each) for each in values])) for name, values in maxima.items()}

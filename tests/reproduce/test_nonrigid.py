@@ -1,0 +1,77 @@
+"""The flexible array of paper A: what is compared is compared fairly, and what is shared is what is said."""
+
+import numpy as np
+import pytest
+
+from polyins.recording import Recording
+from polyins.reproduce import a5, a6, nonrigid
+from polyins.reproduce.feedback import outage_maxima
+from polyins.reproduce.progress import Steps
+from polyins.reproduce.rigid_array import maxima
+from polyins.simulation.scenario import Scenario
+
+SECONDS = 150.0
+
+
+def shortened(test: str) -> Scenario:
+    scenario = nonrigid.scenario_of(test, quick=True)
+    return scenario.model_copy(update={"duration_s": SECONDS, "static_s": 30.0, "outages": ((90.0, 120.0),)})
+
+
+@pytest.fixture(scope="module")
+def lawn() -> Recording:
+    return nonrigid.recording_of(shortened("test A"), 0)
+
+
+@pytest.fixture(scope="module")
+def rigid() -> Recording:
+    return nonrigid.recording_of(shortened("rigid"), 0)
+
+
+def test_feeding_nothing_back_is_enav_fusion(lawn: Recording) -> None:
+    nothing = outage_maxima(lawn, velocity=False, attitude=False)
+    np.testing.assert_allclose(nothing, maxima(lawn, "enav-fusion"), rtol=1e-6)
+
+
+def test_feeding_attitude_and_velocity_back_is_nearly_imu_fusion(lawn: Recording, rigid: Recording) -> None:
+    for recording in (lawn, rigid):
+        both = outage_maxima(recording, velocity=True, attitude=True)
+        np.testing.assert_allclose(both, maxima(recording, "imu-fusion"), rtol=0.1)
+
+
+def test_flexing_troubles_imu_fusion_and_spares_nav_fusion(lawn: Recording, rigid: Recording) -> None:
+    # the same sensors, errors, path and ground
+    worse = {name: maxima(lawn, name)[0] - maxima(rigid, name)[0] for name in ("imu-fusion", "nav-fusion")}
+    assert worse["imu-fusion"] > 0.5
+    assert abs(worse["nav-fusion"]) < 0.2
+
+
+def test_figures_are_pooled_over_all_outages_of_all_seeds() -> None:
+    maxima_by_seed = {"single": [np.array([3.0, 4.0]), np.array([0.0, 5.0])]}
+    assert nonrigid.pooled(maxima_by_seed)["single"] == pytest.approx(np.sqrt(50.0 / 4.0))
+
+
+def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    row = {"single": 6.0, "imu-fusion": 5.0, "nav-fusion": 2.5, "enav-fusion": 2.0}
+
+    def table(*_: object, **__: object) -> dict[str, float]:
+        return row
+
+    monkeypatch.setattr(a5, "table", table)
+    monkeypatch.setattr(a5, "time_ratios", lambda quick, steps: dict(a5.PAPER_TIME))
+    document = a5.reproduce(quick=True)
+    assert set(document["paper"]) <= set(document["polyins"])
+    assert document["polyins"]["test A"]["imu_fusion_over_nav_fusion"] == pytest.approx(2.0)
+    assert document["polyins"]["test B"]["ratio"]["enav-fusion"] == pytest.approx(3.0)
+    # Table V divides the rigid array's 4.87 m
+    assert document["paper"]["test A"]["ratio_to_rigid_single"]["nav-fusion"] == pytest.approx(1.56, abs=0.005)
+    assert document["paper"]["test B"]["ratio_to_rigid_single"]["imu-fusion"] == pytest.approx(1.16, abs=0.005)
+    assert sorted(document["polyins"]["roughness_mm"]) == ["1.2", "1.6", "2"]
+
+
+def test_costs_of_sharing_are_relative_to_enav_fusion() -> None:
+    costs = a6.with_costs(a6.PAPER["test A"])["cost"]
+    assert costs == {"attitude and velocity shared": pytest.approx(0.552, abs=0.001)}
+    shares: list[float] = []
+    Steps(shares.append, 2).next()(1.0)
+    assert shares == [0.5]

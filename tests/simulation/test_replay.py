@@ -1,0 +1,129 @@
+"""A replayed drive goes where the positions were, at their speed, pointing along its course."""
+
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.geodesy import displacement
+from polyins.rig import DEG
+from polyins.simulation.path import Path, drive
+from polyins.simulation.replay import HELD_BELOW, replay
+
+Array = NDArray[np.float64]
+
+STD = np.array([0.013, 0.010, 0.023])
+
+
+@pytest.fixture(scope="module")
+def original() -> Path:
+    return drive(240.0, static=30.0, seed=3)
+
+
+@pytest.fixture(scope="module")
+def fixes(original: Path) -> tuple[Array, Array, Array]:
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 241.0)
+    position = original.position(time)
+    metres = rng.normal(0.0, 0.3 * STD, (len(time), 3))
+    return 1000.0 + time, position + original.world.displacement(position, metres), np.tile(STD, (len(time), 1))
+
+
+@pytest.fixture(scope="module")
+def again(fixes: tuple[Array, Array, Array]) -> Path:
+    return replay(*fixes)
+
+
+def test_it_stays_near_the_positions(original: Path, again: Path) -> None:
+    time = np.arange(0.0, 240.0, 0.1)
+    origin = original.position(np.zeros(1))[0]
+    apart = displacement(again.position(time), origin, True) - displacement(original.position(time), origin, True)
+    assert np.abs(apart[:, :2]).max() < 1.5
+    assert np.abs(apart[:, 2]).max() < 1.0
+
+
+def test_it_drives_at_the_speed_along_the_course_of_the_positions(original: Path, again: Path) -> None:
+    time = np.arange(35.0, 239.0, 0.1)
+    speed = original.speed(time)
+    assert np.sqrt(np.mean((again.speed(time) - speed) ** 2)) < 0.15
+    fast = speed > 3.0
+    apart = again.heading(time[fast]) - original.heading(time[fast])
+    apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
+    assert np.sqrt(np.mean(apart**2)) < 1.0 * DEG
+    assert np.sqrt(np.mean((again.pitch(time[fast]) - original.pitch(time[fast])) ** 2)) < 1.0 * DEG
+
+
+def test_it_stands_while_the_positions_do(again: Path) -> None:
+    assert 26.0 <= again.static <= 31.0
+    still = np.linspace(0.0, again.static, 500)
+    assert not again.speed(still).any()
+    for curve in (again.roll, again.pitch, again.heading):
+        np.testing.assert_allclose(curve(still, 1), 0.0, atol=1e-12)
+
+
+def test_its_heading_is_held_where_it_is_slow(again: Path) -> None:
+    time = np.arange(0.0, 240.0, 0.01)
+    slow = again.speed(time) < 0.5 * HELD_BELOW
+    assert np.abs(again.heading(time[slow], 1)).max() < 10.0 * DEG
+
+
+def test_its_velocity_is_the_derivative_of_its_position(again: Path) -> None:
+    time, step = np.linspace(40.0, 230.0, 200), 1e-3
+    before, truth, after = (again.truth(time + shift) for shift in (-step, 0.0, step))
+    origin = truth.position[0]
+    change = displacement(after.position, origin, True) - displacement(before.position, origin, True)
+    north = np.abs(change[:, 0] / (2.0 * step) - truth.velocity[:, 0])
+    # the plane at the first position turns away from n by 1.6e-7 rad per metre
+    assert north.max() < 0.02
+
+
+def test_its_curves_have_continuous_derivatives(again: Path) -> None:
+    knots = np.arange(50.0, 200.0, 0.5)
+    for curve in (again.speed, again.roll, again.pitch, again.heading):
+        for order in (1, 2, 3):
+            left, right = curve(knots - 1e-6, order), curve(knots + 1e-6, order)
+            np.testing.assert_allclose(left, right, atol=1e-3 * max(np.abs(left).max(), 1e-6))
+
+
+def test_equal_seeds_give_equal_roads(fixes: tuple[Array, Array, Array], again: Path) -> None:
+    time = np.linspace(0.0, 240.0, 50)
+    np.testing.assert_array_equal(replay(*fixes).roll(time), again.roll(time))
+    other = replay(*fixes, seed=1)
+    np.testing.assert_array_equal(other.heading(time), again.heading(time))
+    assert np.abs(other.roll(time) - again.roll(time)).max() > 0.1 * DEG
+
+
+@pytest.mark.parametrize(
+    ("rows", "change", "expected"),
+    [
+        (5, "", "expected at least 6 at increasing times"),
+        (30, "time", "expected at least 6 at increasing times"),
+        (30, "std", "standard deviations above zero"),
+        (20, "", "never move faster than"),
+    ],
+)
+def test_positions_that_make_no_path(
+    fixes: tuple[Array, Array, Array], rows: int, change: str, expected: str
+) -> None:
+    time, position, std = (values[:rows].copy() for values in fixes)
+    if change == "time":
+        time[3] = time[2]
+    if change == "std":
+        std[1] = 0.0
+    with pytest.raises(InputError, match=expected):
+        replay(time, position, std)
+
+
+def test_the_real_track(data_folder: FilePath) -> None:
+    rows = np.loadtxt(data_folder / "whu-array" / "gnss_group1.txt")[:900]
+    points = np.column_stack([rows[:, 1:3] * DEG, rows[:, 3]])
+    path = replay(rows[:, 0], points, rows[:, 4:7])
+    driven = path.position(rows[:, 0] - rows[0, 0])
+    apart = displacement(driven, points[0], True) - displacement(points, points[0], True)
+    assert np.abs(apart[:, :2]).max() < 0.8
+    assert path.static == pytest.approx(358.0, abs=4.0)
+    time = np.arange(0.0, path.duration, 0.1)
+    assert np.abs(path.speed(time, 1)).max() < 4.0
+    assert np.abs(path.speed(time) * path.heading(time, 1)).max() < 4.0
