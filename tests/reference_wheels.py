@@ -45,10 +45,10 @@ from reference_filter import (
     noise_density,
     skew,
 )
+from scipy.spatial.transform import Rotation
 
 from polyins.recording import Recording, RollingOptions
 from polyins.rig import DEG, Imu
-from scipy.spatial.transform import Rotation
 
 N = 24
 SPEED_ERROR = 21
@@ -248,9 +248,7 @@ def remove_errors(earth: Earth, state: WheelState, dx: Array) -> WheelState:
 def transition(earth: Earth, imu: Imu, state: WheelState, current: Increment) -> tuple[Array, Array]:
     """Phi = I + F dt and Q = G Qc G' dt of one IMU; the mounting stays as it is."""
     Phi, Q = np.eye(N), np.zeros((N, N))
-    Phi[:21, :21] += (
-        error_dynamics(earth, state, current.rate, current.force, imu.noise.correlation_time) * current.dt
-    )
+    Phi[:21, :21] += error_dynamics(earth, state, current.rate, current.force, imu.noise.correlation_time) * current.dt
     Q[:21, :21] = noise_density(state.C, imu.noise) * current.dt
     return Phi, Q
 
@@ -312,8 +310,7 @@ class WheelFilter:
         if self.joined:
             models = [(block_diagonal([Phi for Phi, _ in models]), block_diagonal([Q for _, Q in models]))]
         self.covariances = [
-            Phi @ P @ Phi.T + 0.5 * (Phi @ Q @ Phi.T + Q)
-            for P, (Phi, Q) in zip(self.covariances, models, strict=True)
+            Phi @ P @ Phi.T + 0.5 * (Phi @ Q @ Phi.T + Q) for P, (Phi, Q) in zip(self.covariances, models, strict=True)
         ]
         before, self.states = self.states, [
             self.advance(*member) for member in zip(self.states, self.previous, current, strict=True)

@@ -123,8 +123,10 @@ class RollingTruth:
 
     def reference_point(self, time: Array) -> Array:
         """North, east, down from where it is at time[0], shape (T, 3)."""
+
         def velocity(t: Array) -> Array:
             return self.speed(t)[:, None] * self.vehicle_attitude(t)[:, :, 0]
+
         return np.vstack([np.zeros(3), np.cumsum(integrals(velocity, time), axis=0)])
 
     def states(self, i: int, time: Array) -> list[WheelState]:

@@ -182,9 +182,7 @@ def test_derivative_of_the_speed(earth: Earth, i: int, lends: bool, seed: int) -
         measured = np.array([(1.0 + state.mounting[0]) * speed, 0.0, 0.0])
         return point_velocity(earth, ROBOT[i], state, body, rate, POINT) - measured
 
-    own, lent = point_velocity_derivative(
-        earth, ROBOT[i], truth.states[i], lender(truth, lends), truth.rates[i], POINT
-    )
+    own, lent = point_velocity_derivative(earth, ROBOT[i], truth.states[i], lender(truth, lends), truth.rates[i], POINT)
     own[0, 21] = speed
     expected_own, expected_lent = differences(earth, i, truth, lends, predict)
     # the earth's turning below the lever arm is left out: earth rate x arm
@@ -315,9 +313,7 @@ def test_the_mean_over_a_window_has_no_residual(i: int) -> None:
         time = 3.0 + dt * np.arange(window * factor + 1)
         own, bodies = truth.states(i, time), truth.states(2, time)
         steps = range(1, len(time))
-        ways = [
-            point_displacement(ROBOT[i], own[k - 1], own[k], (bodies[k - 1], bodies[k]), dt, POINT) for k in steps
-        ]
+        ways = [point_displacement(ROBOT[i], own[k - 1], own[k], (bodies[k - 1], bodies[k]), dt, POINT) for k in steps]
         spins = [truth.stream(j, time).dtheta[1:, 0].sum() for j in (0, 1)]
         radii = [imu.wheel.radius for imu in ROBOT if imu.wheel is not None]
         measured = -np.mean([radius * spin for radius, spin in zip(radii, spins, strict=True)])

@@ -73,11 +73,13 @@ def _pairs(recording: Recording, gnss: GnssStream, solution: Solution) -> tuple[
 
     antenna = Rotation.from_quat(solution.attitude, scalar_first=True).apply(recording.rig.antenna)
     way = displacement(solution.position, solution.position[0], recording.geodetic) + antenna
-    far = np.flatnonzero(np.linalg.norm(way[:, :2], axis=1) > LENGTH)
-    end = solution.time[far[0]] if len(far) else solution.time[-1]
-    shown = (gnss.time >= solution.time[0]) & (gnss.time <= end)
+    shown = (gnss.time >= solution.time[0]) & (gnss.time <= solution.time[-1])
     for first, last in recording.outages:
         shown &= ~((gnss.time > first) & (gnss.time < last))
+    if shown.any():
+        begin = min(int(np.searchsorted(solution.time, gnss.time[shown][0])), len(way) - 1)
+        far = np.flatnonzero(np.linalg.norm(way[:, :2] - way[begin, :2], axis=1)[begin:] > LENGTH)
+        shown &= gnss.time <= (solution.time[begin + far[0]] if len(far) else solution.time[-1])
     fixes = displacement(gnss.position[shown], gnss.position[0], recording.geodetic)[:, :2]
     track = np.column_stack([np.interp(gnss.time[shown], solution.time, way[:, k]) for k in range(2)])
     return track, fixes

@@ -76,9 +76,7 @@ def test_a_solution_that_diverged_gives_null_and_says_so():
 def test_a_reference_that_ends_a_little_early_is_not_told_of(epochs, told):
     """Half a second, and two seconds, of two minutes."""
     truth = drive()
-    early = reference(
-        truth, time=truth.time[:epochs], position=truth.geodetic[:epochs], velocity=None, attitude=None
-    )
+    early = reference(truth, time=truth.time[:epochs], position=truth.geodetic[:epochs], velocity=None, attitude=None)
     warnings = summarize(solution(truth), early, [])["warnings"]
     assert any(f"covers {epochs} of 1201 epochs" in warning for warning in warnings) == told
 

@@ -165,5 +165,3 @@ def test_steps_add_up_to_one() -> None:
     second(1.0)
     assert shares == [0.25, 0.75, 1.0]
     Steps(None, 1).next()(1.0)
-
-

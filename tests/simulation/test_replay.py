@@ -104,9 +104,7 @@ def test_equal_seeds_give_equal_roads(fixes: tuple[Array, Array, Array], again: 
         (20, "", "never move faster than"),
     ],
 )
-def test_positions_that_make_no_path(
-    fixes: tuple[Array, Array, Array], rows: int, change: str, expected: str
-) -> None:
+def test_positions_that_make_no_path(fixes: tuple[Array, Array, Array], rows: int, change: str, expected: str) -> None:
     time, position, std = (values[:rows].copy() for values in fixes)
     if change == "time":
         time[3] = time[2]

@@ -60,9 +60,7 @@ def _table(cost: Array) -> dict[str, dict[str, float]]:
     }
 
 
-def _times_faster(
-    dense: Array, structured: Array
-) -> dict[str, float]:
+def _times_faster(dense: Array, structured: Array) -> dict[str, float]:
     return _by_method(np.median(dense / structured, axis=0))
 
 

@@ -162,9 +162,7 @@ def wrong_heading(recording: Recording) -> Recording:
 def tilted_modules(recording: Recording) -> Recording:
     """Return the recording with each module turned about its y and z axes, by drawn angles."""
     rng = np.random.default_rng(0)
-    turned = {
-        name: rotation_matrix(np.array([0.0, *rng.normal(0.0, TILT, 2)])) for name in recording.rig.modules()
-    }
+    turned = {name: rotation_matrix(np.array([0.0, *rng.normal(0.0, TILT, 2)])) for name in recording.rig.modules()}
     streams = tuple(
         replace(stream, dtheta=stream.dtheta @ turned[imu.module], dvel=stream.dvel @ turned[imu.module])
         for imu, stream in zip(recording.rig.imus, recording.imus, strict=True)

@@ -84,8 +84,7 @@ def _smoothed(time: Array, points: Array, std: Array, grid: Array) -> tuple[Arra
 
     metres = (points - points[0]) * np.abs(metres_per_unit(points[0], geodetic=True))
     north, east, up = (
-        UnivariateSpline(time, metres[:, axis], w=1.0 / std[:, axis], k=DEGREE, s=float(len(time)))
-        for axis in range(3)
+        UnivariateSpline(time, metres[:, axis], w=1.0 / std[:, axis], k=DEGREE, s=float(len(time))) for axis in range(3)
     )
     inside = np.clip(grid, time[0], time[-1])
     velocity = np.column_stack([north(inside, 1), east(inside, 1)])
