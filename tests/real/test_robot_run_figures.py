@@ -45,7 +45,7 @@ def test_a_single_wheel_is_worst_and_body_and_wheel_best(base):
 def test_the_mean_over_the_window_suffers_from_a_gyro_scale_about_the_axle_that_the_filter_does_not_know(folder, base):
     def rate(name):
         recording = base if name == "base" else EXPERIMENTS[name].recording(folder, 0)
-        return np.mean([score(solve(recording, label)[1]).drift_percent for label in FEW["wheel-ins"][::2]])
+        return np.mean([score(solve(recording, label)[1]).drift_percent for label in FEW["wheel-ins"][::4]])
 
     assert rate("gyro scale about the axle, window") > 2.0 * rate("gyro scale about the axle")
     assert rate("filter knows the gyro scale, window") < 1.1 * rate("base")
@@ -53,7 +53,7 @@ def test_the_mean_over_the_window_suffers_from_a_gyro_scale_about_the_axle_that_
 
 @pytest.mark.parametrize("case", ["Table III, predicted at the end", "as the filter believes"])
 def test_separate_filters_drift_like_one_for_all_but_believe_too_much(folder, case):
-    runs = b7.run_both(b7.case_recording(case, folder, 0), b7.LABELS[:3])
+    runs = b7.run_both(b7.case_recording(case, folder, 0), b7.LABELS[:2])
     rates = {name: np.mean([run.score.drift_percent for run in several]) for name, several in runs.items()}
     assert rates["distributed"] == pytest.approx(rates["centralized"], rel=0.1)
     position = {name: np.mean([run.position_nees for run in several]) for name, several in runs.items()}

@@ -46,11 +46,11 @@ class Increments:
         axes to the array's (None: the same axes).
         """
         arm = np.asarray(position, dtype=float)
-        dvel = self.dvel + (self.lever.reshape(-1, 3) @ arm).reshape(-1, 3)
+        dvel = self.dvel + np.einsum("tij,j->ti", self.lever, arm)
         if rotation is None:
             return self.dtheta.copy(), dvel
         C_ab = np.asarray(rotation, dtype=float)
-        return self.dtheta @ C_ab, dvel @ C_ab
+        return np.einsum("tj,ji->ti", self.dtheta, C_ab), np.einsum("tj,ji->ti", dvel, C_ab)
 
 
 def increments(path: Path, rate_hz: float = 200.0) -> Increments:

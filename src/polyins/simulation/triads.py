@@ -48,7 +48,7 @@ class Chip:
 def product(matrix: Array, vectors: Array) -> Array:
     """Return matrix @ vector of each of the vectors, shape (T, 3)."""
     # BLAS wakes all its threads for a 3 x 3 matrix, mostly for nothing
-    return vectors if np.array_equal(matrix, np.eye(3)) else vectors @ matrix.T
+    return vectors if np.array_equal(matrix, np.eye(3)) else np.einsum("tj,ij->ti", vectors, matrix)
 
 
 def skewed(angles: Vector) -> Array:
