@@ -87,14 +87,23 @@ def test_a_steered_wheel_is_no_odometer(figures: dict[str, Any], name: str) -> N
     assert figures["controls"][name]["rate_percent"] > 2.0
 
 
-def test_only_a_spinning_wheel_averages_its_gyro_biases_out(figures: dict[str, Any]) -> None:
-    def ratio(condition: str) -> float:
-        wheel, body = (figures["controls"][f"{name}, {condition}"]["rate_percent"] for name in wid.WITHOUT_BIAS)
-        return float(body / wheel)
-
-    # trial 08 stops half-way for eight seconds: nothing averages there, unless the filter has found the bias by then
-    assert ratio(wid.NO_BIAS) > 3.0
-    assert ratio(f"{wid.NO_BIAS}, {wid.ADMITTED}") > 4.0
+@pytest.mark.parametrize(
+    "condition",
+    [
+        pytest.param(
+            wid.NO_BIAS,
+            marks=pytest.mark.xfail(
+                strict=True,
+                reason="trial 08 stops half-way for eight seconds: nothing averages there, and a filter that takes its"
+                " gyros for calibrated has not found the biases by then; 3.6 times",
+            ),
+        ),
+        f"{wid.NO_BIAS}, {wid.ADMITTED}",
+    ],
+)
+def test_only_a_spinning_wheel_averages_its_gyro_biases_out(figures: dict[str, Any], condition: str) -> None:
+    wheel, body = (figures["controls"][f"{name}, {condition}"]["rate_percent"] for name in wid.WITHOUT_BIAS)
+    assert body > 4.0 * wheel
 
 
 def test_plain_names_choose_the_rear_wheels_and_never_a_steered_one(folder: Path) -> None:
