@@ -18,11 +18,13 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from polyins import datasets as datasets
+    from polyins.alignment import Start as Start
     from polyins.batch import run as run
     from polyins.comparison import compare as compare
     from polyins.errors import InputError as InputError
     from polyins.evaluation.summary import summarize as evaluate
     from polyins.loading import load as load
+    from polyins.navigator import Navigator as Navigator
     from polyins.recording import Recording as Recording
     from polyins.rig import Imu as Imu
     from polyins.rig import NoiseGrade as NoiseGrade
@@ -33,10 +35,12 @@ if TYPE_CHECKING:
 _HOMES = {
     "InputError": "errors",
     "Imu": "rig",
+    "Navigator": "navigator",
     "NoiseGrade": "rig",
     "Recording": "recording",
     "Rig": "rig",
     "Solution": "solution",
+    "Start": "alignment",
     "compare": "comparison",
     "load": "loading",
     "run": "batch",

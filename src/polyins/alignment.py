@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
 from polyins.kernels import earth
 from polyins.recording import GnssStream, Recording, StartOptions
-from polyins.rig import DEG
+from polyins.rig import DEG, Rig
 from polyins.timesync import Aligned
 
 Array = NDArray[np.float64]
@@ -54,6 +54,47 @@ class Start:
     """what was used for each of them, in words"""
     imu_attitudes: Array | None = None
     """roll, pitch, heading of each IMU of a rig with wheels, rad, shape (N, 3)"""
+
+    @classmethod
+    def known(
+        cls,
+        rig: Rig,
+        time: float,
+        position: ArrayLike,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        attitude: ArrayLike = (0.0, 0.0, 0.0),
+        *,
+        position_std: ArrayLike = 0.1,
+        velocity_std: ArrayLike = 0.1,
+        attitude_std: ArrayLike = (0.5 * DEG, 0.5 * DEG, 2.0 * DEG),
+    ) -> Start:
+        """Return a start of an array that is known otherwise; units as above, a std is one number or one per axis."""
+
+        def vector(value: ArrayLike) -> Array:
+            return np.broadcast_to(np.asarray(value, dtype=float), (3,)).copy()
+
+        return cls(
+            time,
+            vector(position),
+            vector(velocity),
+            vector(attitude),
+            vector(position_std),
+            vector(velocity_std),
+            vector(attitude_std),
+            imu_errors=np.array([imu.initial_errors.as_array() for imu in rig.imus]),
+            imu_error_std=np.array([imu.start_std() for imu in rig.imus]),
+            sources={},
+        )
+
+    def subset(self, indices: list[int]) -> Start:
+        """Return the start of just the IMUs of those indices."""
+        attitudes = None if self.imu_attitudes is None else self.imu_attitudes[indices]
+        return replace(
+            self,
+            imu_errors=self.imu_errors[indices],
+            imu_error_std=self.imu_error_std[indices],
+            imu_attitudes=attitudes,
+        )
 
 
 def find_start(recording: Recording, aligned: Aligned) -> Start:

@@ -126,15 +126,7 @@ def _check_finite(run: Prepared) -> None:
 def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance: bool = False) -> Prepared:
     """Lay a run out, as `run` does before its first epoch."""
     row = find_method(method)
-    if recording.rig.rolling and not row.rolling:
-        raise InputError(f"method: {row.name} is for arrays; this rig has wheels: expected one like wheel-ins")
-    if row.bank == "one":
-        if not 0 <= imu < len(recording.imus):
-            raise InputError(f"imu: {imu} is not an index of {len(recording.imus)} IMUs; they count from 0")
-        recording = recording.subset([imu])
-    chosen = modules.choose(row, recording.rig) if row.rolling else None
-    if chosen:
-        recording = recording.subset(chosen.all)
+    recording = recording.subset(taken(row, recording.rig, imu))
     aligned = timesync.align(recording.imus, bridge=not row.rolling)
     if row.rolling and course.is_wanted(recording):
         start = _start_on_course(row, recording, aligned)
@@ -144,8 +136,26 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     aligned = aligned.between(start.time, end)
     if len(aligned.time) < 2:
         raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")
-    if chosen:
-        return _prepare_rolling(row, recording, chosen, aligned, start, dense_covariance)
+    return lay_out(row, recording, aligned, start, dense_covariance=dense_covariance)
+
+
+def taken(row: Method, rig: Rig, imu: int = 0) -> list[int]:
+    """Return the indices of the IMUs that a method takes, in its order; `single` takes `imu`."""
+    if rig.rolling and not row.rolling:
+        raise InputError(f"method: {row.name} is for arrays; this rig has wheels: expected one like wheel-ins")
+    if row.bank == "one":
+        if not 0 <= imu < len(rig.imus):
+            raise InputError(f"imu: {imu} is not an index of {len(rig.imus)} IMUs; they count from 0")
+        return [imu]
+    return modules.choose(row, rig).all if row.rolling else list(range(len(rig.imus)))
+
+
+def lay_out(
+    row: Method, recording: Recording, aligned: Aligned, start: Start, *, dense_covariance: bool = False
+) -> Prepared:
+    """Lay out the IMUs that a method takes from the epoch at which it starts; the fixes are those of the recording."""
+    if row.rolling:
+        return _lay_out_rolling(row, recording, aligned, start, dense_covariance)
     members = _members(row, recording.rig, start)
     plan, inputs = build_plan(row, recording, aligned), build_inputs(recording, aligned)
     return Prepared(
@@ -177,9 +187,10 @@ def _start_on_course(row: Method, recording: Recording, aligned: Aligned) -> Sta
     return replace(start, attitude_std=std, sources={**start.sources, "heading": found.source})
 
 
-def _prepare_rolling(
-    row: Method, recording: Recording, chosen: Modules, aligned: Aligned, start: Start, dense_covariance: bool
+def _lay_out_rolling(
+    row: Method, recording: Recording, aligned: Aligned, start: Start, dense_covariance: bool
 ) -> Prepared:
+    chosen = modules.choose(row, recording.rig)
     spans, order = modules.lanes(chosen)
     imus = recording.rig.imus
     members = [
@@ -189,7 +200,7 @@ def _prepare_rolling(
     joined = modules.joined(len(spans)) if row.joined else None
     plan = build_plan(row, recording, aligned)
     inputs = build_inputs(recording, replace(aligned, increments=aligned.increments[:, :, order]))
-    speed = [imus[chosen.all.index(module[0])] for module in chosen.speed]
+    speed = [imus[module[0]] for module in chosen.speed]
     blocks = np.zeros(((len(order) + LANES - 1) // LANES, bank.SIZE))
     blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
     assert start.imu_attitudes is not None

@@ -395,7 +395,7 @@ def begin(
         strapdown.remember(w)
     for s in range(state.members.shape[0]):
         fuse.fuse_measurements(state.blocks, state.members[s, 0], state.members[s, 1], state.groups[s], interval)
-    _gather_idle_lanes(state.blocks, state.members)
+    gather_idle_lanes(state.blocks, state.members)
     if rolling is None:
         merge(state.blocks, state.groups, state.members, state.clock[1])
     else:
@@ -439,7 +439,7 @@ def _log(state: State, outputs: Outputs, time: float) -> None:
 
 
 @kernel
-def _gather_idle_lanes(blocks: Array, members: Array) -> None:
+def gather_idle_lanes(blocks: Array, members: Array) -> None:
     """Put the lanes without an IMU where the last one before them is: they would fall for hours otherwise."""
     for s in range(members.shape[0]):
         last = members[s, 1] - 1
@@ -511,4 +511,4 @@ def run_epochs(
         write(groups, members, states, variances, k)
         if (k - 1) % plan.log_every == 0:
             _log(state, outputs, end)
-            _gather_idle_lanes(blocks, members)
+            gather_idle_lanes(blocks, members)

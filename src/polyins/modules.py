@@ -128,21 +128,16 @@ def lanes(modules: Modules) -> tuple[list[tuple[int, int]], list[int]]:
 def rolling(
     modules: Modules, spans: list[tuple[int, int]], recording: Recording, aligned: Aligned, start_bias: Array
 ) -> Rolling:
-    """Lay out what the engine needs of the wheels. `recording` and `aligned` hold the IMUs of `modules.all` in order.
+    """Lay out what the engine needs of the wheels, whose modules are those of this recording.
 
     `start_bias`: gyro biases at the start, rad/s, shape (N, 3).
     """
     options = recording.options.rolling
-    position = {index: place for place, index in enumerate(modules.all)}
-    here = [tuple(position[i] for i in module) for module in modules.navigate]
-    speed = [tuple(position[i] for i in module) for module in modules.speed]
+    here = modules.navigate
     imus = recording.rig.imus
     bodies = [s for s, module in enumerate(here) if imus[module[0]].wheel is None]
+    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
     missing = aligned.missing
-    present = np.zeros((0, len(here)), dtype=np.uint8)
-    if missing.any():
-        speaks = [~missing[:, module].any(axis=1) for module in here]
-        present = np.ascontiguousarray(np.array(speaks, dtype=np.uint8).T)
     memory = np.zeros(wheels.MEMORY)
     memory[wheels.LAST_SPEED] = memory[wheels.LAST_POINT] = aligned.time[0]
     memory[wheels.WATCHED] = -1.0
@@ -152,8 +147,8 @@ def rolling(
         ** 2,
         settings=_settings(options),
         antenna=recording.rig.antenna,
-        travel=_travel(speed, recording.rig, aligned, start_bias),
-        present=present,
+        travel=travel(modules, recording.rig, aligned.increments, intervals, missing, start_bias),
+        present=present(modules, missing if missing.any() else missing[:0]),
         drift=np.zeros((len(here), 3)),
         memory=memory,
         silent=np.full(len(here), -1.0),
@@ -176,21 +171,35 @@ def _settings(options: RollingOptions) -> Array:
     return settings
 
 
-def _travel(speed: list[tuple[int, ...]], rig: Rig, aligned: Aligned, start_bias: Array) -> Array:
+def present(modules: Modules, missing: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return where all IMUs of a share have data, shape (T, shares), from where each lacks them, shape (T, N)."""
+    return np.ascontiguousarray(
+        np.array([~missing[:, module].any(axis=1) for module in modules.navigate], dtype=np.uint8).T
+    )
+
+
+def travel(
+    modules: Modules,
+    rig: Rig,
+    increments: Array,
+    intervals: Array,
+    missing: NDArray[np.bool_],
+    start_bias: Array,
+) -> Array:
     """Return what the wheels rolled in each interval and where the mean of those that speak is, shape (T, 2), m.
 
     v = -r w_x, with the rate as the gyro shows it less its bias at the start; chips of a module are averaged.
+    `increments` is (T, 6, N), `intervals` (T,), `missing` (T, N), `start_bias` (N, 3).
     """
-    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
     total, places, count = np.zeros(len(intervals)), np.zeros(len(intervals)), np.zeros(len(intervals))
-    for module in speed:
+    for module in modules.speed:
         rolled = np.zeros(len(intervals))
         speaks = np.ones(len(intervals), dtype=bool)
         for i in module:
             wheel = rig.imus[i].wheel
             assert wheel is not None
-            rolled -= wheel.radius * (aligned.increments[:, 0, i] - start_bias[i, 0] * intervals) / len(module)
-            speaks &= ~aligned.missing[:, i]
+            rolled -= wheel.radius * (increments[:, 0, i] - start_bias[i, 0] * intervals) / len(module)
+            speaks &= ~missing[:, i]
         total += np.where(speaks, rolled, 0.0)
         places += np.where(speaks, rig.imus[module[0]].position[1], 0.0)
         count += speaks

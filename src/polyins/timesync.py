@@ -45,10 +45,10 @@ class Aligned:
 def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
     """Bring the streams onto the time stamps of the first one without gaps, within their common span.
 
-    The increments of the others are interpolated as running sums, so that no rotation or velocity is lost or counted
-    twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one, the mean
-    of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Raises InputError if less
-    than two seconds are common.
+    The increments of the others are shared out between its intervals, so that no rotation or velocity is lost or
+    counted twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one,
+    the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Raises
+    InputError if less than two seconds are common.
     """
     time = _common_time(streams, bridge)
     increments = np.empty((len(time), 6, len(streams)))
@@ -103,13 +103,12 @@ def _common_time(streams: tuple[ImuStream, ...], bridge: bool) -> Array:
 
 
 def _resample(stamps: Array, values: Array, time: Array) -> Array:
-    """Interpolate the running sum of `values` and return its differences over the intervals of `time`."""
-    edges = np.concatenate([[stamps[0] - np.median(np.diff(stamps))], stamps])
-    sums = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
-    at = np.concatenate([[time[0] - np.median(np.diff(time))], time])
+    """Return what was measured over the intervals of `time`; a sample is constant within its own."""
+    from polyins.kernels.resample import resample
+
     out = np.empty((len(time), values.shape[1]))
-    for k in range(values.shape[1]):
-        out[:, k] = np.diff(np.interp(at, edges, sums[:, k]))
+    before, begin = stamps[0] - np.median(np.diff(stamps)), time[0] - np.median(np.diff(time))
+    resample(np.ascontiguousarray(stamps), values, before, np.ascontiguousarray(time), begin, out)
     return out
 
 

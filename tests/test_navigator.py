@@ -1,0 +1,168 @@
+"""The live front gives what a batch run gives, bit for bit, in whatever order and however late the data come."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from array_recordings import START, Array, shaken_path, shaken_recording, start_at
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from playing import events, feed, navigator_for, play, row, rows
+from test_vehicle import drive, with_rolling, without
+
+from polyins import batch
+from polyins.errors import InputError
+from polyins.navigator import Navigator
+from polyins.recording import GnssStream, ImuStream, Recording
+from polyins.solution import Solution
+
+ARRAYS = ("single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization")
+WHEELS = ("wheel-ins", "body-ins", "triple-ins", "triple-ins/centralized")
+
+
+def of_own_clocks(recording: Recording) -> Recording:
+    """Each IMU but the first somewhat before the one before it, at a rate of its own."""
+    streams = [
+        replace(stream, time=stream.time * (1.0 - 0.004 * i) - 0.0013 * i) for i, stream in enumerate(recording.imus)
+    ]
+    # not at the first sample, of which only the usual interval tells where it begins
+    start = start_at(shaken_path(float(streams[0].time[-1]), start=START), 0.1)
+    return replace(recording, imus=tuple(streams), start=start)
+
+
+def with_gap(recording: Recording, imu: int, begin: float, end: float) -> Recording:
+    streams = list(recording.imus)
+    kept = (streams[imu].time <= begin) | (streams[imu].time >= end)
+    old = streams[imu]
+    streams[imu] = ImuStream(old.name, old.time[kept], old.dtheta[kept], old.dvel[kept])
+    return replace(recording, imus=tuple(streams))
+
+
+def with_velocities(recording: Recording) -> Recording:
+    """Every other fix has a velocity that is hardly believed: the recording's own are left out."""
+    gnss = recording.gnss
+    assert gnss is not None
+    velocity = np.tile([-9.0, 7.0, 0.0], (len(gnss.time), 1))
+    return replace(recording, gnss=replace(gnss, velocity=velocity, velocity_std=np.full_like(velocity, 5.0)))
+
+
+def replayed(recording: Recording, method: str, lateness: float = -0.001, **options: float) -> dict[float, Array]:
+    prepared = batch.prepare(recording, method)
+    return play(navigator_for(prepared, **options), prepared.recording, events(prepared.recording, lateness))
+
+
+def assert_same(states: dict[float, Array], solution: Solution) -> None:
+    """Every epoch of the solution, with the same bits."""
+    np.testing.assert_array_equal(list(states), solution.time)
+    np.testing.assert_array_equal(list(states.values()), rows(solution))
+
+
+@pytest.mark.parametrize("method", ARRAYS)
+def test_a_replay_is_the_batch_run_to_the_last_bit(method: str) -> None:
+    recording = shaken_recording(3, 4.0)
+    assert_same(replayed(recording, method, delay=0.1), batch.run(recording, method))
+
+
+@pytest.mark.parametrize("method", WHEELS)
+def test_so_it_is_with_wheels(method: str) -> None:
+    recording = drive(gnss=True)
+    assert_same(replayed(recording, method, delay=0.1), batch.run(recording, method))
+
+
+def test_so_it_is_with_a_silent_wheel() -> None:
+    recording = without(drive(), "left1", 6.0, 7.0)
+    assert_same(replayed(recording, "triple-ins"), batch.run(recording, "triple-ins"))
+
+
+def test_so_it_is_with_velocities_and_outages() -> None:
+    recording = replace(with_velocities(shaken_recording(2, 4.0)), outages=((1.5, 2.5),))
+    assert_same(replayed(recording, "enav-fusion"), batch.run(recording, "enav-fusion"))
+
+
+@pytest.mark.parametrize("method", ["imu-fusion", "enav-fusion"])
+def test_so_it_is_with_imus_of_own_clocks(method: str) -> None:
+    recording = of_own_clocks(shaken_recording(3, 4.0))
+    assert_same(replayed(recording, method), batch.run(recording, method))
+
+
+@pytest.mark.parametrize(("imus", "length"), [((1,), 0.1), ((1,), 0.6), ((0, 1, 2), 0.1)])
+def test_so_it_is_with_gaps(imus: tuple[int, ...], length: float) -> None:
+    recording = of_own_clocks(shaken_recording(3, 4.0))
+    for imu in imus:
+        recording = with_gap(recording, imu, 2.0, 2.0 + length)
+    assert_same(replayed(recording, "enav-fusion"), batch.run(recording, "enav-fusion"))
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=8, deadline=None)
+def test_the_order_of_arrival_does_not_matter(seed: int) -> None:
+    recording = of_own_clocks(shaken_recording(2, 2.5, rate_hz=100.0))
+    prepared = batch.prepare(recording, "enav-fusion")
+    rng = np.random.default_rng(seed)
+    mixed = sorted(events(recording), key=lambda event: event.arrives + rng.uniform(0.0, 0.06))
+    navigator = navigator_for(prepared, wait=0.1, delay=10.0)
+    play(navigator, recording, mixed)
+    np.testing.assert_array_equal(window(navigator), rows(batch.run(recording, "enav-fusion")))
+    assert not navigator.counts
+
+
+def window(navigator: Navigator) -> Array:
+    return np.array([row(state) for state in navigator.history()])
+
+
+@pytest.mark.parametrize("lateness", [0.003, 0.3, 0.9])
+@pytest.mark.parametrize("method", ["single", "enav-fusion", "nav-fusion"])
+def test_fixes_that_come_late_are_applied_at_their_own_time(method: str, lateness: float) -> None:
+    recording = shaken_recording(2, 4.0)
+    prepared = batch.prepare(recording, method)
+    recording, on_time, late = prepared.recording, navigator_for(prepared), navigator_for(prepared)
+    play(on_time, recording, events(recording))
+    play(late, recording, events(recording, lateness))
+    np.testing.assert_array_equal(window(late), window(on_time))
+    assert not late.counts
+
+
+def test_with_wheels_too() -> None:
+    prepared = batch.prepare(drive(gnss=True), "triple-ins/centralized")
+    recording, on_time, late = prepared.recording, navigator_for(prepared), navigator_for(prepared)
+    play(on_time, recording, events(recording))
+    play(late, recording, events(recording, 0.5))
+    np.testing.assert_array_equal(window(late), window(on_time))
+
+
+def test_a_fix_that_is_later_than_agreed_is_counted() -> None:
+    recording = shaken_recording(1, 4.0)
+    navigator = navigator_for(batch.prepare(recording, "single"), delay=0.2)
+    play(navigator, recording, events(recording, 1.5))
+    assert recording.gnss is not None
+    assert navigator.counts == {"late": len(recording.gnss.time)}
+
+
+@pytest.mark.parametrize("method", ["single", "enav-fusion", "triple-ins/centralized"])
+def test_killed_anywhere_it_resumes_bit_for_bit(method: str, tmp_path: Path) -> None:
+    recording = drive(gnss=True) if "triple" in method else of_own_clocks(shaken_recording(2, 4.0))
+    prepared = batch.prepare(recording, method)
+    recording, played = prepared.recording, events(prepared.recording, 0.21)
+    whole = navigator_for(prepared)
+    play(whole, recording, played)
+    for place in np.random.default_rng(5).integers(0, len(played), 12):
+        navigator = navigator_for(prepared)
+        for event in played[:place]:
+            feed(navigator, recording, event)
+        navigator.save(tmp_path / "checkpoint")
+        resumed = Navigator.resume(tmp_path / "checkpoint")
+        play(resumed, recording, played[place:])
+        np.testing.assert_array_equal(window(resumed), window(whole))
+        assert resumed.counts == whole.counts
+
+
+def test_another_file_is_no_checkpoint(tmp_path: Path) -> None:
+    path = tmp_path / "some"
+    path.write_text("some text")
+    with pytest.raises(InputError, match="expected a file that a navigator saved"):
+        Navigator.resume(path)
+    with pytest.raises(InputError, match="is no checkpoint"):
+        Navigator.resume(tmp_path / "nothing")
