@@ -11,12 +11,12 @@ from array_recordings import START, Array, shaken_path, shaken_recording, start_
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from playing import events, feed, navigator_for, play, row, rows
-from test_vehicle import drive, with_rolling, without
+from test_vehicle import drive, without
 
 from polyins import batch
 from polyins.errors import InputError
 from polyins.navigator import Navigator
-from polyins.recording import GnssStream, ImuStream, Recording
+from polyins.recording import ImuStream, Recording
 from polyins.solution import Solution
 
 ARRAYS = ("single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.kernels.resample import assemble
+from polyins.kernels.resample import assemble, covered_until
 from polyins.timesync import GAP
 
 Array = NDArray[np.float64]
@@ -92,6 +92,7 @@ class Assembly:
         self.before = np.full(self.count, -math.inf)
         self.ends = np.full(self.count, -math.inf)
         self.nominal = np.full(self.count, math.nan)
+        self.covered = np.full(self.count, -math.inf)
         self.silent = np.zeros(self.count, dtype=bool)
         self._leaps = [_Leap() for _ in range(self.count)]
         self._nothing_missing = np.zeros(self.count, dtype=bool)
@@ -238,9 +239,12 @@ class Assembly:
                 end = self._stamp_in_gap(end)
         if end == math.inf:
             return None
-        expected = (self.ends < end) & ~self.silent
-        if expected.any() and (at_end or self.newest < end + self._patience()):
-            return None
+        if at_end:
+            return None if (self.ends < end)[~self.silent].any() else end
+        if self.newest < end + self._patience():
+            covered_until(self.stamps, self.first, self.last, self.before, USUAL * self.nominal, self.covered)
+            if (self.covered < end)[~self.silent].any():
+                return None
         return end
 
     def _patience(self) -> float:

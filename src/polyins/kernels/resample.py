@@ -82,3 +82,14 @@ def assemble(
         while first[i] < last[i] and stamps[i, first[i]] <= end:
             before[i] = stamps[i, first[i]]
             first[i] += 1
+
+
+@kernel
+def covered_until(stamps: Array, first: Array, last: Array, before: Array, longest: Array, out: Array) -> None:
+    """Write into `out` (N,) up to when the waiting samples follow each other by no more than `longest` (N,)."""
+    for i in range(stamps.shape[0]):
+        out[i] = before[i]
+        for j in range(first[i], last[i]):
+            if stamps[i, j] - out[i] > longest[i]:
+                break
+            out[i] = stamps[i, j]
