@@ -78,6 +78,10 @@ class Assembly:
     """s, the usual interval of each IMU; NaN as long as it is not known"""
     silent: NDArray[np.bool_] = field(init=False)
     """IMUs that have not been there for the last epoch, and are not waited for"""
+    behind: int = 0
+    """IMUs that are not silent and have nothing after `now`"""
+    patience: float = 0.0
+    """s, of data, for which an epoch waits"""
     held: list[tuple[float, float]] = field(default_factory=list)
     """end and length of epochs without any data, which are bridged from both sides, s"""
     seen: tuple[Array, float] | None = None
@@ -114,6 +118,8 @@ class Assembly:
         self.stamps[i, k] = time
         self.values[i, k] = values
         self.last[i] = k + 1
+        if end <= self.now < time and not self.silent[i]:
+            self.behind -= 1
         self.ends[i] = time
         self.silent[i] = False
         if time > self.newest:
@@ -130,6 +136,7 @@ class Assembly:
         self.now = self.newest = time
         self.before[:] = time
         self.ends[:] = time
+        self.behind = self.count
         increments = values.T
         self.seen = (increments, interval)
         return Epoch(time, increments, self._nothing_missing)
@@ -137,6 +144,8 @@ class Assembly:
     def epochs(self, at_end: bool = False) -> Iterator[Epoch]:
         """Yield the epochs that wait for nothing any longer; `at_end`, all for which all IMUs have data."""
         if self.now == -math.inf and not self._begin(at_end):
+            return
+        if self.behind and not at_end and self.newest < self.now + self.patience:
             return
         while (end := self._next_end(at_end)) is not None:
             yield from self._take(end)
@@ -159,6 +168,8 @@ class Assembly:
         self._leaps = [_Leap(float(begin), float(end)) for begin, end in arrays["leaps"]]
         if "increments" in arrays:
             self.seen = (arrays["increments"], float(arrays["interval"]))
+        if self.now > -math.inf:
+            self._look()
 
     def _leapt(self, i: int, time: float) -> bool:
         """Whether IMU i has gone on for long at stamps which at first were too far ahead."""
@@ -226,6 +237,7 @@ class Assembly:
         stamps = self.stamps[lead, : self.last[lead]]
         earlier = stamps[stamps < self.stamps[waiting, 0].max()]
         self.now = float(earlier[-1] if len(earlier) else self.before[lead])
+        self._look()
         return True
 
     def _next_end(self, at_end: bool) -> float | None:
@@ -233,7 +245,7 @@ class Assembly:
         end = self._next_stamp(0, 0.0)
         nominal = self.nominal[0]
         if end - self.now > USUAL * nominal:
-            if not at_end and self.newest < self.now + nominal + self._patience():
+            if not at_end and self.newest < self.now + nominal + self.patience:
                 return None
             if end - self.now > GAP * nominal:
                 end = self._stamp_in_gap(end)
@@ -241,14 +253,16 @@ class Assembly:
             return None
         if at_end:
             return None if (self.ends < end)[~self.silent].any() else end
-        if self.newest < end + self._patience():
+        if self.newest < end + self.patience:
             covered_until(self.stamps, self.first, self.last, self.before, USUAL * self.nominal, self.covered)
             if (self.covered < end)[~self.silent].any():
                 return None
         return end
 
-    def _patience(self) -> float:
-        return max(self.wait, (GAP + USUAL) * float(self.nominal.max()))
+    def _look(self) -> None:
+        """Take note of who is there and how long to wait for the others."""
+        self.behind = int(np.count_nonzero((self.ends <= self.now) & ~self.silent))
+        self.patience = max(self.wait, (GAP + USUAL) * float(self.nominal.max()))
 
     def _next_stamp(self, i: int, margin: float) -> float:
         first, last = self.first[i], self.last[i]
@@ -282,6 +296,7 @@ class Assembly:
             increments,
             missing,
         )
+        self._look()
         increments = np.ascontiguousarray(increments.T)
         if not missing.any():
             yield from self._bridged(end - begin, Epoch(end, increments, missing))

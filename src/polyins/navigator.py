@@ -128,13 +128,17 @@ class Navigator:
         In array axes: a rotated mount is the caller's. Without `imu`, samples of all IMUs with one stamp, shape (N, 3).
         A sample that cannot be taken is counted in `counts`.
         """
-        values = np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64)
-        if not math.isfinite(values.sum()) or not math.isfinite(time):
+        if imu is None:
+            self._all(time, np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64).reshape(-1, 6)[self._taken])
+            return
+        values = np.empty(6)
+        values[:3], values[3:] = dtheta, dvel
+        if not _finite(time, values):
             self._refuse(NOT_FINITE)
-        elif imu is None:
-            self._all(time, values.reshape(-1, 6)[self._taken])
         elif imu in self._place:
-            self._refuse(self._assembly.add(self._place[imu], time, values))
+            refused = self._assembly.add(self._place[imu], time, values)
+            if refused:
+                self._refuse(refused)
             self._step()
 
     def gnss(
@@ -234,6 +238,9 @@ class Navigator:
             self.counts[why] = self.counts.get(why, 0) + 1
 
     def _all(self, time: float, values: Array) -> None:
+        if not _finite(time, values.ravel()):
+            self._refuse(NOT_FINITE)
+            return
         epoch = self._assembly.pass_through(time, values)
         if epoch is not None:
             self._take(epoch)
@@ -300,6 +307,11 @@ def _state(line: Timeline, k: int) -> NavigatorState:
         velocity_std=np.sqrt(variances[3:6]),
         phi_covariance=variances[6:12],
     )
+
+
+def _finite(time: float, values: Array) -> bool:
+    # of all sums the fastest: what is not finite does not cancel
+    return math.isfinite(values.dot(values) + time)
 
 
 def _or_none(value: float) -> float | None:
