@@ -71,6 +71,7 @@ def differing(recording: pi.Recording, method: str, folder: Path) -> int:
 
 
 def main() -> None:
+    """Print the figures as JSON."""
     recording = pi.simulate(Scenario(duration_s=30, static_s=10, rate_hz=50, imus=Board(count=3)))
     with tempfile.TemporaryDirectory() as folder:
         figures = {method: differing(recording, method, Path(folder)) for method in METHODS}

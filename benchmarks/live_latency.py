@@ -64,6 +64,7 @@ def timed(seconds: float, one_by_one: bool) -> tuple[Array, pi.Navigator]:
 
 
 def main() -> None:
+    """Print the figures as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--one-by-one", action="store_true")
