@@ -36,7 +36,6 @@ from polyins.simulation.run import record
 from polyins.simulation.scenario import Errors
 
 SEEDS = 5
-EXPERIMENT_SEEDS = 2
 PREDICTIONS = ("window", "end")
 ERROR_FREE = Errors(noise=False, biases=False, scales=False)
 ONE_SAMPLE_S = 0.005
@@ -71,7 +70,7 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     over_window, at_end = _scores(folder, seeds, configurations, done)
     found = {}
     for name, experiment in experiments.items():
-        found[name] = run_experiment(experiment, folder, range(EXPERIMENT_SEEDS))
+        found[name] = run_experiment(experiment, folder)
         done()
     return {
         "target": "b6",
@@ -119,9 +118,9 @@ def _horizontal_max(recording: Recording, label: str) -> float:
     return float(np.max(compare_to_reference(batch.run(recording, label), recording.reference).horizontal))
 
 
-def run_experiment(experiment: Experiment, folder: Path, seeds: Iterable[int]) -> Table:
+def run_experiment(experiment: Experiment, folder: Path) -> Table:
     """Return the table of an experiment."""
-    return table([score_all(experiment.recording(folder, seed), FEW) for seed in seeds])
+    return table([score_all(experiment.recording(folder, seed), FEW) for seed in range(experiment.seeds)])
 
 
 def _settings(
@@ -135,7 +134,7 @@ def _settings(
             "chips": chips().model_dump(mode="json"),
             "filter": FILTER_NOISE.model_dump(mode="json"),
             "experiments": {name: experiment.source for name, experiment in experiments.items()},
-            "experiment_seeds": EXPERIMENT_SEEDS,
+            "experiment_seeds": {name: experiment.seeds for name, experiment in experiments.items()},
             "experiment_runs": {name: len(labels) for name, labels in FEW.items()},
             "quick": quick,
         }
