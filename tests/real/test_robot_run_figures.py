@@ -8,23 +8,25 @@ import pytest
 from polyins.reproduce import b6, b7
 from polyins.reproduce.robot import FEW, score, score_all, solve, table
 from polyins.reproduce.robot_experiments import EXPERIMENTS
+from polyins.reproduce.sites import Site
+from polyins.simulation.vehicles import ROBOT
 
 
 @pytest.fixture(scope="module")
-def folder(data_folder):
+def place(data_folder):
     folder = data_folder / "whu-robot"
     if not folder.is_dir():
         pytest.skip(f"no data set: {folder}")
-    return folder
+    return Site(ROBOT, folder)
 
 
 @pytest.fixture(scope="module")
-def base(folder):
-    return EXPERIMENTS["base"].recording(folder, 0)
+def base(place):
+    return EXPERIMENTS["base"].recording(place, 0)
 
 
-def test_wheel_ins_without_errors_stays_on_the_track(folder):
-    furthest = b6.error_free_run(folder, "plane")
+def test_wheel_ins_without_errors_stays_on_the_track(place):
+    furthest = b6.error_free_run(place, "plane")
     assert furthest["window, 0.1 s"] < 0.005
     assert furthest["window, 0.005 s"] < 0.005
     assert furthest["end, 0.005 s"] < 0.1
@@ -42,9 +44,9 @@ def test_a_single_wheel_is_worst_and_body_and_wheel_best(base):
     assert all(0.5 < row["heading_mean_deg"] < 1.5 for row in figures.values())
 
 
-def test_the_mean_over_the_window_suffers_from_a_gyro_scale_about_the_axle_that_the_filter_does_not_know(folder, base):
+def test_the_mean_over_the_window_suffers_from_a_gyro_scale_about_the_axle_that_the_filter_does_not_know(place, base):
     def rate(name):
-        recording = base if name == "base" else EXPERIMENTS[name].recording(folder, 0)
+        recording = base if name == "base" else EXPERIMENTS[name].recording(place, 0)
         return np.mean([score(solve(recording, label)[1]).drift_percent for label in FEW["wheel-ins"][::4]])
 
     assert rate("gyro scale about the axle, window") > 2.0 * rate("gyro scale about the axle")
@@ -52,8 +54,8 @@ def test_the_mean_over_the_window_suffers_from_a_gyro_scale_about_the_axle_that_
 
 
 @pytest.mark.parametrize("case", ["Table III, predicted at the end", b7.BELIEVED])
-def test_separate_filters_drift_like_one_for_all_but_believe_too_much(folder, case):
-    runs = b7.run_both(b7.case_recording(case, folder, 0), b7.LABELS[:2])
+def test_separate_filters_drift_like_one_for_all_but_believe_too_much(place, case):
+    runs = b7.run_both(b7.case_recording(case, place, 0), b7.LABELS[:2])
     rates = {name: np.mean([run.score.drift_percent for run in several]) for name, several in runs.items()}
     assert rates["distributed"] == pytest.approx(rates["centralized"], rel=0.1)
     position = {name: np.mean([run.position_nees for run in several]) for name, several in runs.items()}
@@ -64,14 +66,14 @@ def test_separate_filters_drift_like_one_for_all_but_believe_too_much(folder, ca
         assert position["centralized"] < 2.0 * 2.0
         assert heading < 2.0
         # it is the reference point, taken for news, that makes them believe too much
-        alone = b7.run_both(b7.case_recording(f"{b7.BELIEVED}, no reference point", folder, 0), b7.LABELS[:1])
+        alone = b7.run_both(b7.case_recording(f"{b7.BELIEVED}, no reference point", place, 0), b7.LABELS[:1])
         own, joint = (runs[0].position_nees for runs in (alone["distributed"], alone["centralized"]))
         assert own == pytest.approx(joint, rel=0.05)
         assert own < 2.0 * 2.0
 
 
-def test_a_gyro_scale_as_printed_has_nothing_to_do_with_the_tables(folder):
-    recording = EXPERIMENTS["gyro scale 0.03"].recording(folder, 0)
+def test_a_gyro_scale_as_printed_has_nothing_to_do_with_the_tables(place):
+    recording = EXPERIMENTS["gyro scale 0.03"].recording(place, 0)
     recording = replace(recording, start=replace(recording.start, end_time=400.0))
     errors = [solve(recording, label)[1] for label in FEW["wheel-ins"][:3]]
     assert np.mean([score(one).heading_deg for one in errors]) > 5.0

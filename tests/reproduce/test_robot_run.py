@@ -14,9 +14,9 @@ from polyins.modules import choose
 from polyins.recording import Reference
 from polyins.reproduce import b7, robot_experiments
 from polyins.reproduce.robot import CONFIGURATIONS, FEW, Score, as_in_the_paper, at_the_reference, by_seed, score, table
-from polyins.simulation.robot import robot_scenario
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario
+from polyins.simulation.vehicles import ROBOT
 
 RUNS = {"wheel-ins": 8, "dual-wheel-ins": 16, "body-wheel-ins": 16, "triple-ins": 16}
 
@@ -24,7 +24,7 @@ RUNS = {"wheel-ins": 8, "dual-wheel-ins": 16, "body-wheel-ins": 16, "triple-ins"
 @pytest.fixture(scope="module")
 def short():
     """The robot's rig on a short drive on the turning Earth."""
-    robot = robot_scenario(".", earth="turning")
+    robot = ROBOT.scenario(earth="turning")
     scenario = Scenario(
         duration_s=60.0,
         static_s=10.0,

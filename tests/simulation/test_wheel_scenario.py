@@ -6,9 +6,9 @@ import pytest
 from polyins.errors import InputError
 from polyins.loading import load
 from polyins.simulation.files import write
-from polyins.simulation.robot import robot, robot_scenario
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario, read_scenario, simulate, simulate_with_truth
+from polyins.simulation.vehicles import ROBOT
 from polyins.simulation.wheel_scenario import Slip, Track, WheelModule
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "robot.yaml"
@@ -223,7 +223,7 @@ def robot_data(data_folder):
 
 
 def test_the_robot_s_path_is_drivable(robot_data):
-    scenario = robot_scenario(robot_data, errors=PERFECT)
+    scenario = ROBOT.scenario(robot_data, errors=PERFECT)
     path = scenario.track.path(scenario.static_s, (0.0, 0.0, 0.0), scenario.world())
     time = np.arange(0.0, path.duration, 0.02)
     assert np.abs(path.heading(time, 1)).max() < 1.5
@@ -236,7 +236,8 @@ def test_the_robot_s_path_is_drivable(robot_data):
 
 
 def test_the_robot_has_three_modules_of_four_chips(robot_data):
-    recording = robot(robot_data, seed=3)
+    scenario = ROBOT.scenario(robot_data, duration_s=40.0)
+    recording = record(true_run(scenario), seed=3).recording
     assert [len(chips) for chips in recording.rig.modules().values()] == [4, 4, 4]
     radii = np.array([imu.wheel.radius for imu in recording.rig.imus if imu.wheel])
     assert 1e-4 < np.abs(radii / 0.097 - 1.0).max() < 6e-3

@@ -1,22 +1,22 @@
-"""Paper B's Tables IV to VI: a robot with four chips in each of three modules, every configuration of them, simulated.
+"""Paper B's Table VI: what Wheel-INS gains from a second wheel and from the body, on the robot's and the car's tracks.
 
-Real track and speeds (data set whu-robot), Table III's errors but a gyro scale of 0.0015. Nothing is tuned; what
-differs from the paper is taken apart by experiments.
+Table III's errors but a gyro scale of 0.0015. Nothing is tuned; what differs from the paper is taken apart by
+experiments.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from polyins import batch, datasets
+from polyins import batch
 from polyins.evaluation.errors import compare_to_reference
 from polyins.evaluation.summary import plain
 from polyins.recording import Recording, RollingOptions
+from polyins.reproduce.progress import Steps
 from polyins.reproduce.robot import (
     CONFIGURATIONS,
     FEW,
@@ -31,12 +31,15 @@ from polyins.reproduce.robot import (
     table,
 )
 from polyins.reproduce.robot_experiments import EXPERIMENTS, Experiment, World, truth
-from polyins.simulation.robot import FILTER_NOISE, chips
+from polyins.reproduce.sites import Site, site
 from polyins.simulation.run import record
 from polyins.simulation.scenario import Errors
+from polyins.simulation.vehicles import CAR, FILTER_NOISE, ROBOT, chips
 
 SEEDS = 5
-PREDICTIONS = ("window", "end")
+CAR_SEEDS = 3
+PREDICTIONS = {"window": "base, window", "end": "base"}
+"""experiments, by what the wheel speed is compared with"""
 ERROR_FREE = Errors(noise=False, biases=False, scales=False)
 ONE_SAMPLE_S = 0.005
 
@@ -50,58 +53,50 @@ PAPER = {
 
 
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
-    """Run the tables, the error-free run and the experiments, and return the `b6` document.
+    """Run table, car, error-free runs and experiments, and return the `b6` document.
 
-    `quick` takes one seed and fewer combinations, and leaves the experiments out. Raises InputError if the data set is
-    not there.
+    `quick` takes the first five minutes of the drives, one seed and fewer combinations, and leaves the experiments out.
     """
-    folder = datasets.fetch("whu-robot")
-    seeds = range(1 if quick else SEEDS)
+    robot, car = site(ROBOT, quick), site(CAR, quick)
+    seeds, car_seeds = (range(1), range(1)) if quick else (range(SEEDS), range(CAR_SEEDS))
     configurations, experiments = (FEW, {}) if quick else (CONFIGURATIONS, EXPERIMENTS)
-    steps = iter(np.linspace(0.0, 1.0, 2 + len(seeds) + len(experiments))[1:].tolist())
-
-    def done() -> None:
-        if progress:
-            progress(next(steps))
-
     worlds: tuple[World, ...] = ("plane",) if quick else ("plane", "turning")
-    error_free = {world: error_free_run(folder, world) for world in worlds}
-    done()
-    over_window, at_end = _scores(folder, seeds, configurations, done)
-    found = {}
-    for name, experiment in experiments.items():
-        found[name] = run_experiment(experiment, folder)
-        done()
+    steps = Steps(progress, len(PREDICTIONS) * (len(seeds) + len(car_seeds)) + len(worlds) + len(experiments))
+    error_free = {world: error_free_run(robot, world, steps.next()) for world in worlds}
+    tables = {key: _scores(name, robot, seeds, configurations, steps) for key, name in PREDICTIONS.items()}
+    on_car = {key: table(_scores(name, car, car_seeds, FEW, steps)) for key, name in PREDICTIONS.items()}
+    found = {name: run_experiment(experiment, robot, steps.next()) for name, experiment in experiments.items()}
+    window, end = tables["window"], tables["end"]
     return {
         "target": "b6",
         "paper": PAPER,
         "polyins": {
-            **table(over_window),
-            "by seed": by_seed(over_window),
-            "predicted at the end": {**table(at_end), "by seed": by_seed(at_end)},
+            **table(window),
+            "by seed": by_seed(window),
+            "predicted at the end": {**table(end), "by seed": by_seed(end)},
+            "car": {**on_car["window"], "predicted at the end": on_car["end"]},
             "error-free horizontal_max_m": error_free,
             "experiments": found,
         },
-        "settings": _settings(len(seeds), configurations, experiments, quick),
+        "settings": {
+            "tracks": {"robot": robot.source, "car": car.source},
+            **_settings(configurations, experiments),
+            "seeds": {"robot": len(seeds), "car": len(car_seeds)},
+            "quick": quick,
+        },
     }
 
 
 def _scores(
-    folder: Path, seeds: Iterable[int], configurations: Configurations, done: Callable[[], None]
-) -> list[list[Scores]]:
-    """Return the scores of each seed, for each of the two predictions."""
-    found: list[list[Scores]] = [[] for _ in PREDICTIONS]
-    for seed in seeds:
-        recording = record(truth(folder, "plane"), seed=seed).recording
-        for prediction, runs in zip(PREDICTIONS, found, strict=True):
-            runs.append(score_all(as_in_the_paper(recording, prediction), configurations))
-        done()
-    return found
+    experiment: str, place: Site, seeds: Iterable[int], configurations: Configurations, steps: Steps
+) -> list[Scores]:
+    """Return the scores of each seed."""
+    return [score_all(EXPERIMENTS[experiment].recording(place, seed), configurations, steps.next()) for seed in seeds]
 
 
-def error_free_run(folder: Path, world: World) -> dict[str, float]:
+def error_free_run(place: Site, world: World, progress: Callable[[float], None] = lambda _: None) -> dict[str, float]:
     """Return the greatest horizontal error, m, of Wheel-INS on each wheel without any errors of the chips."""
-    run = truth(folder, world)
+    run = truth(place, world)
     scenario = run.scenario.model_copy(update={"errors": ERROR_FREE})
     recording = record(replace(run, scenario=scenario), seed=0).recording
     rows = {
@@ -110,7 +105,9 @@ def error_free_run(folder: Path, world: World) -> dict[str, float]:
         for window in (WINDOW, ONE_SAMPLE_S)
     }
     labels = [f"wheel-ins/{side}1" for side in ("left", "right")]
-    return {name: max(_horizontal_max(changed, label) for label in labels) for name, changed in rows.items()}
+    found = {name: max(_horizontal_max(changed, label) for label in labels) for name, changed in rows.items()}
+    progress(1.0)
+    return found
 
 
 def _horizontal_max(recording: Recording, label: str) -> float:
@@ -118,25 +115,26 @@ def _horizontal_max(recording: Recording, label: str) -> float:
     return float(np.max(compare_to_reference(batch.run(recording, label), recording.reference).horizontal))
 
 
-def run_experiment(experiment: Experiment, folder: Path) -> Table:
+def run_experiment(experiment: Experiment, place: Site, progress: Callable[[float], None] = lambda _: None) -> Table:
     """Return the table of an experiment."""
-    return table([score_all(experiment.recording(folder, seed), FEW) for seed in range(experiment.seeds)])
+    scores = []
+    for seed in range(experiment.seeds):
+        scores.append(score_all(experiment.recording(place, seed), FEW))
+        progress((seed + 1) / experiment.seeds)
+    return table(scores)
 
 
-def _settings(
-    seeds: int, configurations: Configurations, experiments: dict[str, Experiment], quick: bool
-) -> dict[str, Any]:
+def _settings(configurations: Configurations, experiments: dict[str, Experiment]) -> dict[str, Any]:
     settings: dict[str, Any] = plain(
         {
-            "seeds": seeds,
             "runs": {name: len(labels) for name, labels in configurations.items()},
+            "runs of the car and the experiments": {name: len(labels) for name, labels in FEW.items()},
+            "vehicles": {vehicle.name: asdict(vehicle) for vehicle in (ROBOT, CAR)},
             "rolling": {**asdict(RollingOptions()), "standstill": False},
             "chips": chips().model_dump(mode="json"),
             "filter": FILTER_NOISE.model_dump(mode="json"),
             "experiments": {name: experiment.source for name, experiment in experiments.items()},
             "experiment_seeds": {name: experiment.seeds for name, experiment in experiments.items()},
-            "experiment_runs": {name: len(labels) for name, labels in FEW.items()},
-            "quick": quick,
         }
     )
     return settings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from polyins import batch
-from polyins.evaluation.drift import drift
+from polyins.evaluation.drift import drift_rates
 from polyins.evaluation.errors import Errors, compare_to_reference, rms
 from polyins.recording import Recording, Reference, RollingOptions
 from polyins.solution import Solution
@@ -54,6 +54,8 @@ class Score:
     """mean over the multiples of 100 m"""
     heading_deg: float
     """RMSE"""
+    rates_percent: tuple[float, ...] = ()
+    """drift after each 100 m"""
 
 
 Scores = dict[str, list[Score]]
@@ -97,18 +99,35 @@ def solve(recording: Recording, label: str) -> tuple[Solution, Errors]:
 
 def score(errors: Errors) -> Score:
     """Return drift rate and heading error."""
-    rate, attitude = drift(errors)["rate_percent"], errors.attitude
-    assert rate is not None
+    rates, attitude = drift_rates(errors)[1], errors.attitude
     assert attitude is not None
-    return Score(rate, rms(np.degrees(attitude[:, 2])) or 0.0)
+    return Score(float(np.mean(rates)), rms(np.degrees(attitude[:, 2])) or 0.0, tuple(rates.tolist()))
 
 
-def score_all(recording: Recording, configurations: Configurations) -> Scores:
+def score_all(
+    recording: Recording, configurations: Configurations, progress: Callable[[float], None] | None = None
+) -> Scores:
     """Run every combination of every configuration, two at a time."""
     labels = [label for several in configurations.values() for label in several]
+    scores: list[Score] = []
     with ThreadPoolExecutor(WORKERS) as pool:
-        found = iter(list(pool.map(lambda label: score(solve(recording, label)[1]), labels)))
+        for one in pool.map(lambda label: score(solve(recording, label)[1]), labels):
+            scores.append(one)
+            if progress:
+                progress(len(scores) / len(labels))
+    found = iter(scores)
     return {name: [next(found) for _ in several] for name, several in configurations.items()}
+
+
+def figures(rows: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
+    """Return rows of drift, percent, and heading error, deg, by name."""
+    return {name: {"drift_percent": rate, "heading_deg": heading} for name, (rate, heading) in rows.items()}
+
+
+def spread(rows: Sequence[tuple[float, float]]) -> dict[str, dict[str, float]]:
+    """Return mean and standard deviation of such rows."""
+    mean, std = np.mean(rows, axis=0), np.std(rows, axis=0, ddof=1)
+    return figures({"mean": (float(mean[0]), float(mean[1])), "std": (float(std[0]), float(std[1]))})
 
 
 def table(runs: Sequence[Scores]) -> Table:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -18,16 +17,15 @@ from polyins.alignment import rotation_matrix
 from polyins.config import Noise
 from polyins.recording import Recording
 from polyins.reproduce.robot import WINDOW, as_in_the_paper
+from polyins.reproduce.sites import Site
 from polyins.rig import DEG, Imu, Wheel
 from polyins.simulation import earth
 from polyins.simulation.ground import without_twist
-from polyins.simulation.increments import increments
-from polyins.simulation.robot import FILTER_NOISE, GYRO_SCALE_PPM, PRINTED_GYRO_SCALE_PPM, chips, robot_scenario
 from polyins.simulation.run import TrueRun, record, true_run
 from polyins.simulation.scenario import Errors
 from polyins.simulation.track import Course
+from polyins.simulation.vehicles import FILTER_NOISE, GYRO_SCALE_PPM, PRINTED_GYRO_SCALE_PPM, chips
 from polyins.simulation.wheel_scenario import Slip
-from polyins.simulation.wheels import wheel_increments
 
 Array = NDArray[np.float64]
 World = Literal["plane", "turning", "slip", "slopes"]
@@ -46,6 +44,7 @@ CLOCK_ERROR_S = 0.005
 SLIP = Slip(size=0.2, length_s=1.0, every_s=30.0)
 SLOPE = 1.5 * DEG
 SLOPE_LENGTH_M = 60.0
+FIELD_SEEDS = 3
 
 
 @dataclass(frozen=True)
@@ -65,29 +64,29 @@ class Experiment:
     predict: str = "end"
     window: float = WINDOW
     """s"""
-    seeds: int = 2
+    seeds: int = 1
 
-    def recording(self, folder: Path, seed: int) -> Recording:
+    def recording(self, site: Site, seed: int) -> Recording:
         """Return its recording with errors drawn by a seed."""
-        drawn = _drawn(folder, self.world, self.errors, self.noise, self.filter_noise, seed)
+        drawn = _drawn(site, self.world, self.errors, self.noise, self.filter_noise, seed)
         return as_in_the_paper(self.change(drawn), self.predict, self.window)
 
 
 @lru_cache(maxsize=2)
-def _drawn(folder: Path, world: World, errors: Errors, noise: Noise, filter_noise: Noise, seed: int) -> Recording:
-    run = truth(folder, world)
+def _drawn(site: Site, world: World, errors: Errors, noise: Noise, filter_noise: Noise, seed: int) -> Recording:
+    run = truth(site, world)
     scenario = run.scenario.model_copy(update={"errors": errors, "noise": noise, "filter_noise": filter_noise})
     return record(replace(run, scenario=scenario), seed=seed).recording
 
 
 @lru_cache(maxsize=4)
-def truth(folder: Path, world: World) -> TrueRun:
-    """Return the robot's error-free run in a world."""
-    if world == "slip":
-        return true_run(robot_scenario(folder, slip=SLIP))
+def truth(site: Site, world: World = "plane") -> TrueRun:
+    """Return the error-free run of a site's vehicle in a world."""
     if world == "slopes":
-        return _over_slopes(truth(folder, "plane"))
-    return true_run(robot_scenario(folder, earth=world))
+        return _over_slopes(truth(site, "plane"))
+    if world == "slip":
+        return site.vehicle.drive(site.scenario(slip=SLIP))
+    return site.vehicle.drive(site.scenario(earth=world))
 
 
 @dataclass(frozen=True)
@@ -106,17 +105,7 @@ class Waves:
 def _over_slopes(run: TrueRun) -> TrueRun:
     """Return the run over waves of the ground, with roll as the ground has it."""
     assert isinstance(run.path.heading, Course)
-    path = without_twist(replace(run.path, pitch=Waves(run.path.heading)))
-    rng = np.random.default_rng(0)
-    wheels = tuple(wheel.rolls(path, rng) for wheel in run.scenario.wheels)
-    rate = run.scenario.rate_hz
-    return replace(
-        run,
-        path=path,
-        body=increments(path, rate),
-        wheels=wheels,
-        spinning=tuple(wheel_increments(wheel, rate) for wheel in wheels),
-    )
+    return true_run(run.scenario, without_twist(replace(run.path, pitch=Waves(run.path.heading))))
 
 
 def without_earth_rate(recording: Recording) -> Recording:
@@ -206,7 +195,7 @@ def _in_the_field(gyro_scale_ppm: float, source: str) -> Experiment:
         errors=DRIFTING.model_copy(update={"misalignment_deg": CHIP_MISALIGNMENT_DEG}),
         noise=grade(chips(gyro_scale_ppm), correlation_time_h=DRIFT_TIME_H),
         change=in_the_field,
-        seeds=4,
+        seeds=FIELD_SEEDS,
     )
 
 

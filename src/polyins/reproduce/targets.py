@@ -14,9 +14,12 @@ from polyins.screen import number, print_table, say
 
 Document = dict[str, Any]
 
-TARGETS = ("flights", "wid", "array", "consistency", "a1", "a2", "a3", "a4", "a5", "a6", "afig3", "split", "b6", "b7")
+TARGETS = (
+    *("flights", "wid", "array", "consistency", "a1", "a2", "a3", "a4", "a5", "a6", "afig3", "split"),
+    *("b4", "b5", "b6", "b7", "b8", "bfig7", "bfig8", "bfig9", "bfig10"),
+)
 """Each is a module of this package with a function `reproduce(quick, progress)`."""
-WITH_REPORTS = ("wid", "a3", "a5", "afig3")
+WITH_REPORTS = ("wid", "a3", "a5", "afig3", "bfig7", "bfig8", "bfig9", "bfig10")
 """Those whose function also takes `out`, the folder for reports."""
 
 

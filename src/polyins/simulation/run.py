@@ -80,14 +80,14 @@ class Simulation:
     """in the order of the scenario's"""
 
 
-def true_run(scenario: Scenario) -> TrueRun:
+def true_run(scenario: Scenario, path: Path | None = None) -> TrueRun:
     """Return the truth of a scenario: its path, its wheels, and what error-free IMUs put out.
 
-    Raises InputError for a scenario that cannot be.
+    `path`, in the scenario's world, takes the place of its own. Raises InputError for a scenario that cannot be.
     """
     seed = scenario.seed if scenario.path_seed is None else scenario.path_seed
     drive_seed, _, _, wheel_seed, ground_seed = np.random.SeedSequence(seed).spawn(5)
-    path = _path(scenario, drive_seed)
+    path = _path(scenario, drive_seed) if path is None else _shortened(path, scenario)
     wheels = tuple(
         wheel.rolls(path, np.random.default_rng(own_seed))
         for wheel, own_seed in zip(scenario.wheels, wheel_seed.spawn(len(scenario.wheels)), strict=True)
@@ -161,8 +161,7 @@ def checked(seed: int) -> int:
 def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
     start, world = scenario.start_position(), scenario.world()
     if scenario.track:
-        path = scenario.track.path(scenario.static_s, start, world)
-        return replace(path, duration=min(path.duration, scenario.duration_s))
+        return _shortened(scenario.track.path(scenario.static_s, start, world), scenario)
     if scenario.shuttle:
         return scenario.shuttle.path(scenario.duration_s, scenario.static_s, start, world)
     path = drive(
@@ -174,6 +173,10 @@ def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
         world=world,
     )
     return without_twist(path) if scenario.wheels else path
+
+
+def _shortened(path: Path, scenario: Scenario) -> Path:
+    return replace(path, duration=min(path.duration, scenario.duration_s))
 
 
 def _sense(

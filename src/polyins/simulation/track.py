@@ -27,6 +27,7 @@ LEAST_STEP = 0.3  # m from one point to the next: nearer ones tell nothing of th
 DEGREE = 5  # of all splines: four continuous derivatives
 COURSE_STEP = 0.1  # m
 FINE_STEPS = 10  # per COURSE_STEP
+NOISE_AT_REST = 0.05  # m/s, of an odometer
 
 
 @dataclass(frozen=True)
@@ -69,16 +70,23 @@ def track_path(
 
     The curve is smoothed over `smoothing`, m. The path starts at `start`, in the world's coordinates, stands for
     `static` and at the end for `rest`, s; the speeds are smoothed over 0.7 of their interval (1 sigma) and scaled so
-    that they last to the end of the curve.
+    that they last to the end of the curve. Backward speeds within an odometer's noise at rest, 0.05 m/s, are taken as
+    rest.
 
     Raises InputError for points or speeds that make no path.
     """
     points, times, speeds = _distinct(north, east), np.asarray(time, dtype=float), np.asarray(speed, dtype=float)
-    if points.shape[1] <= DEGREE or len(times) < 2 or not np.all(np.diff(times) > 0.0) or not np.all(speeds >= 0.0):
+    if (
+        points.shape[1] <= DEGREE
+        or len(times) < 2
+        or not np.all(np.diff(times) > 0.0)
+        or not np.all(speeds >= -NOISE_AT_REST)
+    ):
         raise InputError(
             f"track: {points.shape[1]} points apart from each other and {len(times)} speeds; expected at least"
             f" {DEGREE + 1} points, two speeds at increasing times, and none of them negative"
         )
+    speeds = np.maximum(speeds, 0.0)
     if not np.any(speeds > 0.0):
         raise InputError("track: the speeds are all zero; expected some above zero")
     length, heading = _course(points, smoothing)

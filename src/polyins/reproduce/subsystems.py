@@ -1,0 +1,96 @@
+"""Paper B's Figs. 7 to 9: errors over time of a system of several IMUs and of each of its IMUs by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polyins.evaluation.errors import Errors
+from polyins.report.palette import FEW_IMUS
+from polyins.report.style import finish, stacked
+from polyins.reproduce.b4 import EXPERIMENT, SEED, SETTINGS
+from polyins.reproduce.pictures import write_figure
+from polyins.reproduce.robot import figures, score, solve
+from polyins.reproduce.robot_experiments import EXPERIMENTS
+from polyins.reproduce.sites import site
+from polyins.simulation.vehicles import ROBOT
+
+Runs = Mapping[str, str]
+"""labels, by the names of the curves"""
+
+HEIGHT = 520
+EVERY = 5
+"""epochs of the reference from one drawn point to the next"""
+
+
+def reproduce(
+    target: str,
+    runs: Runs,
+    paper: Mapping[str, tuple[float, float]],
+    quick: bool,
+    progress: Callable[[float], None] | None,
+    out: Path | None,
+) -> dict[str, Any]:
+    """Run the system, named first, and its parts; draw them into `out`; return the document.
+
+    `paper`: drift, percent, and heading RMSE, deg, of the runs that the tables list.
+    """
+    place = site(ROBOT, quick)
+    recording = EXPERIMENTS[EXPERIMENT].recording(place, SEED)
+    errors: dict[str, Errors] = {}
+    for name, label in runs.items():
+        errors[name] = solve(recording, label)[1]
+        if progress:
+            progress(len(errors) / len(runs))
+    if out is not None:
+        write_figure(picture(errors), out / f"{target}.html")
+    scores = {name: score(one) for name, one in errors.items()}
+    return {
+        "target": target,
+        "paper": figures(paper),
+        "polyins": {
+            **figures({name: (one.drift_percent, one.heading_deg) for name, one in scores.items()}),
+            "share of the time between the least and the largest error of the parts": between(errors),
+        },
+        "settings": {
+            "track": place.source,
+            **SETTINGS,
+            "runs": dict(runs),
+            "paper": "Tables IV and V, whose tests are taken to count the left wheel's chip slowest",
+        },
+    }
+
+
+def between(errors: Mapping[str, Errors]) -> dict[str, float]:
+    """Return how much of the time the first one's error, without its sign, lies within those of the others."""
+    (_, system), *parts = errors.items()
+    return {
+        "position": _within(system.horizontal, [part.horizontal for _, part in parts]),
+        "heading": _within(_heading_deg(system), [_heading_deg(part) for _, part in parts]),
+    }
+
+
+def _within(values: Any, others: list[Any]) -> float:
+    return float(np.mean((values >= np.min(others, axis=0)) & (values <= np.max(others, axis=0))))
+
+
+def _heading_deg(errors: Errors) -> Any:
+    assert errors.attitude is not None
+    return np.degrees(errors.attitude[:, 2])
+
+
+def picture(errors: Mapping[str, Errors]) -> Any:
+    """Return the picture: horizontal error, m, over heading error, deg."""
+    from plotly.graph_objects import Scatter
+
+    figure = stacked(["horizontal error (m)", "heading error (deg)"])
+    for k, (name, one) in enumerate(errors.items()):
+        time = (one.time - one.time[0])[::EVERY]
+        line = {"color": FEW_IMUS[k], "width": 2.4 if k == 0 else 1.4, "dash": "solid" if k == 0 else "dash"}
+        for row, values in enumerate((one.horizontal, _heading_deg(one)), 1):
+            trace = Scatter(x=time, y=values[::EVERY], name=name, legendgroup=name, mode="lines", line=line)
+            figure.add_trace(trace.update(showlegend=row == 1), row=row, col=1)
+    return finish(figure, HEIGHT)
