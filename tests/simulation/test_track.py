@@ -103,3 +103,13 @@ def test_a_point_without_coordinates_is_refused():
 def test_an_odometer_that_never_moves_is_refused():
     with pytest.raises(InputError, match="track: the speeds are all zero; expected"):
         track_path(*loops(), ODOMETER, np.zeros_like(SPEED))
+
+
+def test_an_odometer_s_noise_at_rest_is_rest():
+    noisy = np.where(SPEED == 0.0, -0.02, SPEED)
+    assert np.count_nonzero(noisy < 0.0) == 2
+    path = track_path(*loops(), ODOMETER, noisy, start=ORIGIN, world=Plane())
+    time = np.linspace(0.0, path.duration, 1000)
+    np.testing.assert_array_equal(path.speed(time), along(loops()).speed(time))
+    with pytest.raises(InputError, match="none of them backward"):
+        track_path(*loops(), ODOMETER, np.where(SPEED == 0.0, -0.2, SPEED), start=ORIGIN, world=Plane())

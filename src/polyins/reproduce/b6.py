@@ -61,8 +61,9 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     seeds, car_seeds = (range(1), range(1)) if quick else (range(SEEDS), range(CAR_SEEDS))
     configurations, experiments = (FEW, {}) if quick else (CONFIGURATIONS, EXPERIMENTS)
     worlds: tuple[World, ...] = ("plane",) if quick else ("plane", "turning")
-    steps = Steps(progress, len(PREDICTIONS) * (len(seeds) + len(car_seeds)) + len(worlds) + len(experiments))
-    error_free = {world: error_free_run(robot, world, steps.next()) for world in worlds}
+    steps = Steps(progress, len(PREDICTIONS) * (len(seeds) + len(car_seeds)) + len(worlds) + 1 + len(experiments))
+    error_free = {f"robot, {world}": error_free_run(robot, world, steps.next()) for world in worlds}
+    error_free["car, plane"] = error_free_run(car, "plane", steps.next())
     tables = {key: _scores(name, robot, seeds, configurations, steps) for key, name in PREDICTIONS.items()}
     on_car = {key: table(_scores(name, car, car_seeds, FEW, steps)) for key, name in PREDICTIONS.items()}
     found = {name: run_experiment(experiment, robot, steps.next()) for name, experiment in experiments.items()}

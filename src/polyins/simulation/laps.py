@@ -17,6 +17,8 @@ SPACING_M = 0.5
 SPEED_INTERVAL_S = 0.5
 SPEEDING_S = 40.0
 """from one time of greatest speed to the next"""
+STARTING_S = 10.0
+"""until the speed is reached, and from when it falls to rest"""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Laps:
     def speeds(self) -> tuple[Array, Array]:
         """Return times, s, and speeds, m/s, shape (S,) each."""
         time = np.arange(0.0, self.count * self.around_m / self.speed_m_s, SPEED_INTERVAL_S)
-        return time, self.speed_m_s - self.change_m_s * np.cos(2.0 * np.pi * time / SPEEDING_S)
+        speed = self.speed_m_s - self.change_m_s * np.cos(2.0 * np.pi * time / SPEEDING_S)
+        return time, speed * np.minimum(1.0, np.minimum(time, time[-1] - time) / STARTING_S)
 
     def path(self, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path; it stands for `static`, s, at `start`, in the world's coordinates."""

@@ -84,7 +84,7 @@ def track_path(
     ):
         raise InputError(
             f"track: {points.shape[1]} points apart from each other and {len(times)} speeds; expected at least"
-            f" {DEGREE + 1} points, two speeds at increasing times, and none of them negative"
+            f" {DEGREE + 1} points, two speeds at increasing times, and none of them backward"
         )
     speeds = np.maximum(speeds, 0.0)
     if not np.any(speeds > 0.0):
