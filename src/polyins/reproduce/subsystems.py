@@ -89,7 +89,7 @@ def picture(errors: Mapping[str, Errors]) -> Any:
     figure = stacked(["horizontal error (m)", "heading error (deg)"])
     for k, (name, one) in enumerate(errors.items()):
         time = (one.time - one.time[0])[::EVERY]
-        line = {"color": FEW_IMUS[k], "width": 2.4 if k == 0 else 1.4, "dash": "solid" if k == 0 else "dash"}
+        line = {"color": FEW_IMUS[k], "width": 2.8 if k == 0 else 1.2}
         for row, values in enumerate((one.horizontal, _heading_deg(one)), 1):
             trace = Scatter(x=time, y=values[::EVERY], name=name, legendgroup=name, mode="lines", line=line)
             figure.add_trace(trace.update(showlegend=row == 1), row=row, col=1)
