@@ -26,8 +26,9 @@ def same_keys(paper, polyins):
     )
 
 
-def test_laps_stand_in_and_the_document_says_so(without_data):
+def test_laps_stand_in_and_the_output_says_so(without_data, capsys):
     assert sites.site(CAR).folder is None
+    assert "car: synthetic laps stand in: the data set whu-car is not at hand" in capsys.readouterr().err
     document = b4.reproduce(quick=True)
     assert document["settings"]["track"].startswith("synthetic laps stand in: the data set whu-robot is not at hand")
     assert same_keys(document["paper"], document["polyins"])

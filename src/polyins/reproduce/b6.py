@@ -55,7 +55,7 @@ PAPER = {
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     """Run table, car, error-free runs and experiments, and return the `b6` document.
 
-    `quick` takes the first five minutes of the drives, one seed and fewer combinations, and leaves the experiments out.
+    `quick` takes the first minutes of the drives, one seed and fewer combinations, and leaves the experiments out.
     """
     robot, car = site(ROBOT, quick), site(CAR, quick)
     seeds, car_seeds = (range(1), range(1)) if quick else (range(SEEDS), range(CAR_SEEDS))

@@ -107,7 +107,7 @@ class Run:
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     """Run both filters over eight combinations, and return the `b7` document.
 
-    `quick` takes the first five minutes of the drive, one seed and half of the combinations, and the first case only.
+    `quick` takes the first minutes of the drive, one seed and half of the combinations, and the first case only.
     """
     place = site(ROBOT, quick)
     labels, cases = (LABELS[::2], list(CASES)[:1]) if quick else (LABELS, list(CASES))

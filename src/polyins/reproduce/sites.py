@@ -7,6 +7,7 @@ from pathlib import Path
 
 from polyins import datasets
 from polyins.errors import InputError
+from polyins.screen import say
 from polyins.simulation.scenario import Scenario
 from polyins.simulation.vehicles import LONGEST_S, Earth, Vehicle
 from polyins.simulation.wheel_scenario import Slip
@@ -37,9 +38,12 @@ class Site:
 
 
 def site(vehicle: Vehicle, quick: bool = False) -> Site:
-    """Return where a vehicle drives, the first five minutes of it if `quick`."""
+    """Return where a vehicle drives, the first minutes of it if `quick`; say so if laps stand in."""
     try:
         folder = datasets.fetch(vehicle.dataset)
     except InputError:
         folder = None
-    return Site(vehicle, folder, QUICK_S if quick else LONGEST_S)
+    place = Site(vehicle, folder, QUICK_S if quick else LONGEST_S)
+    if folder is None:
+        say(f"{vehicle.name}: {place.source}")
+    return place
