@@ -72,7 +72,7 @@ class Experiment:
         return as_in_the_paper(self.change(drawn), self.predict, self.window)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)
 def _drawn(site: Site, world: World, errors: Errors, noise: Noise, filter_noise: Noise, seed: int) -> Recording:
     run = truth(site, world)
     scenario = run.scenario.model_copy(update={"errors": errors, "noise": noise, "filter_noise": filter_noise})
