@@ -131,7 +131,8 @@ class _Search:
         if still and self.options.estimate_gyro_bias:
             self._gyro_biases(still, attitude, position)
         else:
-            self.sources["gyro_bias"] = "configuration"
+            largest = self.error_std[:, :3].max() / DEG
+            self.sources["gyro_bias"] = f"configuration, std up to {largest:.3g} deg/s"
         given = self.options.attitude_std
         return Start(
             time=time,
