@@ -196,10 +196,11 @@ def _lay_out_rolling(
     members = [
         Member(imus[i], start.imu_errors[i], start.imu_error_std[i], -imus[i].position, np.zeros(3)) for i in order
     ]
-    rolling = modules.rolling(chosen, spans, recording, aligned, start.imu_errors[:, :3])
+    complete = modules.completed(chosen, imus, aligned, start.imu_errors)
+    rolling = modules.rolling(chosen, spans, recording, complete, start.imu_errors[:, :3])
     joined = modules.joined(len(spans)) if row.joined else None
     plan = build_plan(row, recording, aligned)
-    inputs = build_inputs(recording, replace(aligned, increments=aligned.increments[:, :, order]))
+    inputs = build_inputs(recording, replace(complete, increments=complete.increments[:, :, order]))
     speed = [imus[module[0]] for module in chosen.speed]
     blocks = np.zeros(((len(order) + LANES - 1) // LANES, bank.SIZE))
     blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +105,41 @@ def available(rig: Rig) -> list[str]:
                 continue
             names.append(row.name)
     return names
+
+
+def completed(modules: Modules, imus: tuple[Imu, ...], aligned: Aligned, errors: Array) -> Aligned:
+    """Give a chip that is silent what the other chips of its module measure, so that the module goes on.
+
+    `imus`, `aligned` and `errors`, the slow ones at the start, shape (N, 12), are those of `modules.all` in order.
+    """
+    position = {index: place for place, index in enumerate(modules.all)}
+    increments, missing = aligned.increments.copy(), aligned.missing.copy()
+    for module in dict.fromkeys((*modules.navigate, *modules.speed)):
+        chips = [position[i] for i in module]
+        for i in chips:
+            others = [j for j in chips if j != i]
+            epochs = np.flatnonzero(aligned.missing[:, i] & ~aligned.missing[:, others].all(axis=1))
+            if len(epochs):
+                increments[epochs, :, i] = _from_others(i, others, epochs, imus, aligned, errors)
+                missing[epochs, i] = False
+    return replace(aligned, increments=increments, missing=missing)
+
+
+def _from_others(
+    i: int, others: list[int], epochs: NDArray[np.intp], imus: tuple[Imu, ...], aligned: Aligned, errors: Array
+) -> Array:
+    """Return what chip i would measure in some epochs, with its own biases and at its own place, shape (K, 6)."""
+    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])[epochs, None]
+    weights = (~aligned.missing[epochs][:, others]).astype(float)
+    weights /= weights.sum(axis=1, keepdims=True)
+    known = errors[others, :6] - errors[i, :6]
+    found = np.einsum("tkj,tj->tk", aligned.increments[epochs][:, :, others], weights)
+    found -= weights @ known * intervals
+    places = np.array([imu.position if imu.wheel is None else -imu.wheel.lever_arm for imu in imus])
+    apart = places[i] - weights @ places[others]
+    rate = found[:, :3] / intervals - errors[i, :3]
+    found[:, 3:] += np.cross(rate, np.cross(rate, apart)) * intervals
+    return np.asarray(found)
 
 
 def lanes(modules: Modules) -> tuple[list[tuple[int, int]], list[int]]:
@@ -259,12 +294,37 @@ def mounting_std(imu: Imu, speed: list[Imu]) -> Array:
 
 
 def silences(modules: Modules, recording: Recording, aligned: Aligned) -> tuple[str, ...]:
-    """Return in words which IMUs were silent for how long, among those of `modules.all`."""
+    """Return in words which IMUs were silent for how long, among those of `modules.all`, and what became of them."""
     found = []
     for i, imu in enumerate(recording.rig.imus):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], aligned.missing[:, i].astype(int), [0]])))
-        for first, end in zip(edges[::2], edges[1::2], strict=True):
+        for first, end in _stretches(aligned.missing[:, i]):
             begin, last = aligned.time[max(first - 1, 0)], aligned.time[end - 1]
-            driving = "the others carried it along" if len(modules.navigate) > 1 else "it coasted"
-            found.append(f"IMU {imu.name}: silent for {last - begin:.2f} s from {begin:.2f} s; {driving}")
+            outcome = _outcome(modules, i, aligned, first, end)
+            found.append(f"IMU {imu.name}: silent for {last - begin:.2f} s from {begin:.2f} s; {outcome}")
     return tuple(found)
+
+
+def _outcome(modules: Modules, i: int, aligned: Aligned, first: int, end: int) -> str:
+    """Say what a vehicle did while one of its IMUs was silent, in epochs first ... end - 1."""
+    position = {index: place for place, index in enumerate(modules.all)}
+
+    def silent(module: tuple[int, ...]) -> NDArray[np.bool_]:
+        return np.asarray(aligned.missing[first:end, [position[index] for index in module]].all(axis=1))
+
+    (own,) = {module for module in (*modules.navigate, *modules.speed) if modules.all[i] in module}
+    every = np.all([silent(module) for module in modules.navigate], axis=0)
+    if not silent(own).any():
+        return "its module went on without it"
+    if own not in modules.navigate:
+        return "the others gave the speed" if len(modules.speed) > 1 else "there was no wheel speed"
+    if every.all():
+        return "the vehicle coasted"
+    if every.any():
+        alone = float(np.sum(np.diff(aligned.time, prepend=aligned.time[0])[first:end][every]))
+        return f"for {alone:.2f} s of it every IMU was, and the vehicle coasted"
+    return "the others carried it along"
+
+
+def _stretches(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
+    return [(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
