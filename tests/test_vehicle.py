@@ -278,6 +278,9 @@ def test_a_start_in_motion_is_refused() -> None:
         ("dual-wheel-ins", [0, 2], "needs 2 wheels that do not steer; this rig has 1"),
         ("triple-ins", [0, 1], "needs an IMU on the body"),
         ("multi-wheel-ins", [0], "needs two modules or more"),
+        ("dual-wheel-ins/left1/left1", [0, 1], "says 'left1' twice"),
+        ("wheel-ins/body1", [0, 1, 2], "has no place for 'body1'; expected modules on wheels: 1, on the body: 0"),
+        ("wheel-ins/left/right", [0, 1], "has no place for 'right'"),
         ("wheel-ins/IMU9", [0, 1], "'IMU9' is no IMU or module; expected one of left, right"),
     ],
 )

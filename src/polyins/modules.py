@@ -68,6 +68,7 @@ def choose(row: Method, rig: Rig) -> Modules:
     speed = tuple(wheels_[: row.wheels])
     body = tuple(bodies[: row.bodies])
     _check_enough(row, len(wheels_), len(bodies))
+    _check_taken(row, [i for module in (*speed, *body) for i in module], rig)
     return Modules((*speed, *body) if row.wheels_navigate else body, speed)
 
 
@@ -90,6 +91,18 @@ def _check_enough(row: Method, wheels_: int, bodies: int) -> None:
         )
     if bodies < wanted_bodies:
         raise InputError(f"method: {row.name} needs an IMU on the body; expected one without `wheel` among the imus")
+
+
+def _check_taken(row: Method, taken: list[int], rig: Rig) -> None:
+    """Raise InputError for a name that the method has no place for."""
+    names = {name for i in taken for name in (rig.imus[i].name, rig.imus[i].module)}
+    for word in row.chosen:
+        if word not in names:
+            wheels_, bodies = ("any" if count > 2 else str(count) for count in (row.wheels, row.bodies))
+            raise InputError(
+                f"method: {row.name} has no place for {word!r}; "
+                f"expected modules on wheels: {wheels_}, on the body: {bodies}"
+            )
 
 
 def available(rig: Rig) -> list[str]:
