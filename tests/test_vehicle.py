@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import polyins as pi
 from polyins import batch, modules
-from polyins.aiding import wheels
+from polyins.aiding import rolling
 from polyins.errors import InputError
 from polyins.kernels import bank
 from polyins.kernels.bank import LANES
@@ -204,7 +204,7 @@ def test_driving_straight_on_is_no_standstill() -> None:
     assert reference.velocity is not None
     shown = reference.time > run.start.time
     standing = np.mean(np.linalg.norm(reference.velocity[shown], axis=1) < 0.01) * (reference.time[-1] - run.start.time)
-    assert run.rolling.memory[wheels.STILL] == pytest.approx(standing, abs=2.5)
+    assert run.rolling.memory[rolling.STILL] == pytest.approx(standing, abs=2.5)
 
 
 def test_at_a_stop_the_gyros_are_calibrated() -> None:

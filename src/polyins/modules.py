@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import alignment
-from polyins.aiding import wheels
-from polyins.aiding.wheels import Joint, Rolling
+from polyins.aiding import rolling as places
+from polyins.aiding.rolling import Joint, Rolling
 from polyins.alignment import Start
 from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
@@ -120,36 +120,46 @@ def available(rig: Rig) -> list[str]:
     return names
 
 
-def completed(modules: Modules, imus: tuple[Imu, ...], aligned: Aligned, errors: Array) -> Aligned:
+def completed(
+    modules: Modules,
+    imus: tuple[Imu, ...],
+    increments: Array,
+    intervals: Array,
+    missing: NDArray[np.bool_],
+    errors: Array,
+) -> tuple[Array, NDArray[np.bool_]]:
     """Give a chip that is silent what the other chips of its module measure, so that the module goes on.
 
-    `imus`, `aligned` and `errors`, the slow ones at the start, shape (N, 12), are those of `modules.all` in order.
+    `increments` is (T, 6, N), `intervals` (T,), `missing` (T, N), `errors`, the slow ones at the start, (N, 12).
+    Returns the increments and what is still missing.
     """
-    position = {index: place for place, index in enumerate(modules.all)}
-    increments, missing = aligned.increments.copy(), aligned.missing.copy()
+    found, lacking = increments.copy(), missing.copy()
     for module in dict.fromkeys((*modules.navigate, *modules.speed)):
-        chips = [position[i] for i in module]
-        for i in chips:
-            others = [j for j in chips if j != i]
-            epochs = np.flatnonzero(aligned.missing[:, i] & ~aligned.missing[:, others].all(axis=1))
+        for i in module:
+            others = [j for j in module if j != i]
+            epochs = np.flatnonzero(missing[:, i] & ~missing[:, others].all(axis=1))
             if len(epochs):
-                increments[epochs, :, i] = _from_others(i, others, epochs, imus, aligned, errors)
-                missing[epochs, i] = False
-    return replace(aligned, increments=increments, missing=missing)
+                part = increments[epochs][:, :, others], intervals[epochs, None], ~missing[epochs][:, others]
+                found[epochs, :, i] = _from_others(i, others, imus, *part, errors)
+                lacking[epochs, i] = False
+    return found, lacking
 
 
 def _from_others(
-    i: int, others: list[int], epochs: NDArray[np.intp], imus: tuple[Imu, ...], aligned: Aligned, errors: Array
+    i: int,
+    others: list[int],
+    imus: tuple[Imu, ...],
+    increments: Array,
+    intervals: Array,
+    have: NDArray[np.bool_],
+    errors: Array,
 ) -> Array:
-    """Return what chip i would measure in some epochs, with its own biases and at its own place, shape (K, 6)."""
-    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])[epochs, None]
-    weights = (~aligned.missing[epochs][:, others]).astype(float)
-    weights /= weights.sum(axis=1, keepdims=True)
-    known = errors[others, :6] - errors[i, :6]
-    found = np.einsum("tkj,tj->tk", aligned.increments[epochs][:, :, others], weights)
-    found -= weights @ known * intervals
-    places = np.array([imu.position if imu.wheel is None else -imu.wheel.lever_arm for imu in imus])
-    apart = places[i] - weights @ places[others]
+    """Return what chip i would measure, with its own biases and at its own place, shape (K, 6)."""
+    weights = have / have.sum(axis=1, keepdims=True)
+    found = np.einsum("tkj,tj->tk", increments, weights)
+    found -= weights @ (errors[others, :6] - errors[i, :6]) * intervals
+    spots = np.array([imu.position if imu.wheel is None else -imu.wheel.lever_arm for imu in imus])
+    apart = spots[i] - weights @ spots[others]
     rate = found[:, :3] / intervals - errors[i, :3]
     found[:, 3:] += np.cross(rate, np.cross(rate, apart)) * intervals
     return np.asarray(found)
@@ -186,9 +196,9 @@ def rolling(
     bodies = [s for s, module in enumerate(here) if imus[module[0]].wheel is None]
     intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
     missing = aligned.missing
-    memory = np.zeros(wheels.MEMORY)
-    memory[wheels.LAST_SPEED] = memory[wheels.LAST_POINT] = aligned.time[0]
-    memory[wheels.WATCHED] = -1.0
+    memory = np.zeros(places.MEMORY)
+    memory[places.LAST_SPEED] = memory[places.LAST_POINT] = aligned.time[0]
+    memory[places.FILLED] = -1.0
     return Rolling(
         lenders=np.array([bodies[0] if bodies and s not in bodies else -1 for s in range(len(here))], dtype=np.int64),
         noise=np.array([options.body_speed_std if s in bodies else options.wheel_speed_std for s in range(len(here))])
@@ -197,25 +207,24 @@ def rolling(
         antenna=recording.rig.antenna,
         travel=travel(modules, recording.rig, aligned.increments, intervals, missing, start_bias),
         present=present(modules, missing if missing.any() else missing[:0]),
-        drift=np.zeros((len(here), 3)),
         memory=memory,
         silent=np.full(len(here), -1.0),
-        back=np.full(len(here), -1.0),
-        given=np.zeros(wheels.GIVEN),
+        returned=np.full(len(here), -1.0),
+        given=np.zeros(places.GIVEN),
     )
 
 
 def _settings(options: RollingOptions) -> Array:
-    settings = np.zeros(wheels.SETTINGS)
-    settings[wheels.SPEED_INTERVAL] = options.speed_interval
-    settings[wheels.SPEED_WINDOW] = options.speed_window
-    settings[wheels.POINT_INTERVAL] = options.constraint_interval
-    settings[wheels.AT_END] = float(options.predict == "end")
-    settings[wheels.STANDSTILL] = float(options.standstill)
-    settings[wheels.POINT_VARIANCE] = options.constraint_std**2
-    settings[wheels.ZERO_VELOCITY_VARIANCE] = ZERO_VELOCITY_STD**2
-    settings[wheels.ZERO_RATE_VARIANCE] = ZERO_RATE_STD**2
-    settings[wheels.STILL_RATE] = STILL_RATE
+    settings = np.zeros(places.SETTINGS)
+    settings[places.SPEED_INTERVAL] = options.speed_interval
+    settings[places.SPEED_WINDOW] = options.speed_window
+    settings[places.POINT_INTERVAL] = options.constraint_interval
+    settings[places.AT_END] = float(options.predict == "end")
+    settings[places.STANDSTILL] = float(options.standstill)
+    settings[places.POINT_VARIANCE] = options.constraint_std**2
+    settings[places.ZERO_VELOCITY_VARIANCE] = ZERO_VELOCITY_STD**2
+    settings[places.ZERO_RATE_VARIANCE] = ZERO_RATE_STD**2
+    settings[places.STILL_RATE] = STILL_RATE
     return settings
 
 
@@ -266,7 +275,7 @@ def joined(shares: int) -> Joint:
         gain=np.zeros((3, size)),
         ah=np.zeros((3, size)),
         rows=np.zeros((shares, 3, size)),
-        learned=np.zeros(size),
+        correction=np.zeros(size),
         z=np.zeros(3),
         work=np.zeros(joint.SIZE),
     )
@@ -279,21 +288,18 @@ def fill_lane(w: Array, lane: int, imu: Imu, start: Start, attitude: Array, erro
     """
     from scipy.spatial.transform import Rotation
 
-    def put(field: int, values: Array) -> None:
-        w[field + lane : field + lane + len(values) * LANES : LANES] = values
-
     c = alignment.rotation_matrix(attitude)
     to_wheel = np.zeros(3) if imu.wheel is None else imu.wheel.lever_arm
     place = alignment.rotation_matrix(start.attitude) @ imu.position - c @ to_wheel
-    put(bank.POSITION, start.position + place / metres_per_unit(start.position, geodetic))
-    put(bank.VELOCITY, start.velocity)
-    put(bank.QUATERNION, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
-    put(bank.ERRORS, errors)
-    put(bank.WHEEL, np.array([0.0 if imu.wheel is None else imu.wheel.radius]))
-    put(bank.TO_WHEEL, to_wheel)
-    put(bank.IN_VEHICLE, imu.position)
+    bank.put(w, bank.POSITION, lane, start.position + place / metres_per_unit(start.position, geodetic))
+    bank.put(w, bank.VELOCITY, lane, start.velocity)
+    bank.put(w, bank.QUATERNION, lane, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
+    bank.put(w, bank.ERRORS, lane, errors)
+    bank.put(w, bank.WHEEL, lane, np.array([0.0 if imu.wheel is None else imu.wheel.radius]))
+    bank.put(w, bank.TO_WHEEL, lane, to_wheel)
+    bank.put(w, bank.IN_VEHICLE, lane, imu.position)
     beside = np.array([imu.position[1], 0.0, 0.0])
-    put(bank.TO_SPEED, -imu.position if imu.wheel is None else to_wheel - beside)
+    bank.put(w, bank.TO_SPEED, lane, -imu.position if imu.wheel is None else to_wheel - beside)
 
 
 def mounting_std(imu: Imu, speed: list[Imu]) -> Array:
@@ -319,12 +325,11 @@ def silences(modules: Modules, recording: Recording, aligned: Aligned) -> tuple[
 
 def _outcome(modules: Modules, i: int, aligned: Aligned, first: int, end: int) -> str:
     """Say what a vehicle did while one of its IMUs was silent, in epochs first ... end - 1."""
-    position = {index: place for place, index in enumerate(modules.all)}
 
     def silent(module: tuple[int, ...]) -> NDArray[np.bool_]:
-        return np.asarray(aligned.missing[first:end, [position[index] for index in module]].all(axis=1))
+        return np.asarray(aligned.missing[first:end, module].all(axis=1))
 
-    (own,) = {module for module in (*modules.navigate, *modules.speed) if modules.all[i] in module}
+    (own,) = {module for module in (*modules.navigate, *modules.speed) if i in module}
     every = np.all([silent(module) for module in modules.navigate], axis=0)
     if not silent(own).any():
         return "its module went on without it"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import engine
-from polyins.aiding.wheels import Joint, Rolling
+from polyins.aiding.rolling import Joint, Rolling
 from polyins.batch import Prepared, build_outputs
 from polyins.engine import Inputs, Outputs, Plan, State
 
@@ -100,7 +100,7 @@ class Timeline:
         changing: list[NDArray[np.generic]] = [array for array in prepared.state if array is not prepared.state.members]
         rolling, joined = prepared.rolling, prepared.joined
         if rolling is not None:
-            changing += [rolling.memory, rolling.silent, rolling.back, rolling.given]
+            changing += [rolling.memory, rolling.silent, rolling.returned, rolling.given]
         if joined is not None:
             changing += list(joined)
         ends = np.cumsum([-(-array.size // ALIGNMENT) * ALIGNMENT for array in changing])
