@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import polyins as pi
-from polyins import batch, modules
+from polyins import batch, course, modules
 from polyins.aiding import rolling
 from polyins.errors import InputError
 from polyins.kernels import bank
@@ -289,6 +289,22 @@ def test_a_method_says_what_it_lacks(method: str, kept: list[int], message: str)
     order = sorted(range(3), key=lambda i: recording.rig.imus[i].wheel is None)
     with pytest.raises(InputError, match=message):
         pi.run(recording.subset([order[k] for k in kept]), method)
+
+
+def test_the_heading_is_found_from_no_more_of_the_drive_than_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = drive(gnss=True)
+    ends: list[float | None] = []
+
+    def navigate(blind: Recording) -> Solution:
+        ends.append(blind.start.end_time)
+        return pi.run(blind, "triple-ins")
+
+    found = course.find(recording, 10.0, navigate)
+    monkeypatch.setattr(course, "_end", lambda *given: None)
+    assert course.find(recording, 10.0, navigate) == found
+    assert ends[0] is not None
+    assert 25.0 < ends[0] < 60.0
+    assert ends[1] is None
 
 
 def test_array_methods_are_not_for_vehicles() -> None:

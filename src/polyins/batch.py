@@ -178,7 +178,8 @@ def lay_out(
 
 def _start_on_course(row: Method, recording: Recording, aligned: Aligned) -> Start:
     """Find the start of a vehicle whose heading is to come from GNSS."""
-    found = course.find(recording, lambda blind: run(blind, row.name))
+    begin = alignment.find_start(course.blind(recording), aligned).time
+    found = course.find(recording, begin, lambda blind: run(blind, row.name))
     known = replace(recording.start, heading=found.heading, heading_from="value")
     start = alignment.find_start(replace(recording, start=known), aligned)
     std = start.attitude_std

@@ -22,6 +22,7 @@ from polyins.methods import find_method
 from polyins.modules import choose
 from polyins.recording import Recording
 from polyins.rig import DEG, HOUR, Imu, Rig
+from polyins.screen import number, print_table
 from polyins.solution import Solution
 
 Array = NDArray[np.float64]
@@ -55,6 +56,12 @@ CONFIDENT = "taken for calibrated"
 CALIBRATED_STD = 100.0 * DEG / HOUR
 """rad/s, `init_gb_deg_h` of the data set: what is left of a gyro bias once a standstill's mean is taken off"""
 
+FIGURES = {
+    "rate_percent": "drift\n%",
+    "rate_50m_percent": "at 50 m\n%",
+    "end_percent": "end\n%",
+    "heading_rmse_deg": "heading\ndeg",
+}
 STEPS_M = (100.0, 50.0)
 DRIVING = 1.5
 """m/s: slower than this the reference's heading does not count"""
@@ -100,15 +107,15 @@ def reproduce(
     trials: dict[str, dict[str, Scores]] = {}
     controls: dict[str, dict[str, Scores]] = {}
     settings: dict[str, Any] = {}
-    for done, number in enumerate(numbers, 1):
-        trial = load_trial(folder, number)
+    for done, name in enumerate(numbers, 1):
+        trial = load_trial(folder, name)
         solutions = run_all(trial)
-        trials[number] = {name: score(solution, trial) for name, solution in solutions.items()}
-        controls[number] = {name: score(solution, trial) for name, solution in run_controls(trial).items()}
+        trials[name] = {method: score(solution, trial) for method, solution in solutions.items()}
+        controls[name] = {method: score(solution, trial) for method, solution in run_controls(trial).items()}
         settings = _settings(trial.recording)
         if out is not None:
-            drawn = {name: solution for name, solution in solutions.items() if name in METHODS}
-            _write_report(out / f"wid-trial{number}.html", trial, drawn)
+            drawn = {method: solution for method, solution in solutions.items() if method in METHODS}
+            _write_report(out / f"wid-trial{name}.html", trial, drawn)
         if progress:
             progress(done / len(numbers))
     return {
@@ -122,6 +129,24 @@ def reproduce(
         },
         "settings": {**settings, "trials": numbers, "methods": METHODS | FURTHER, "quick": quick},
     }
+
+
+def print_tables(figures: Mapping[str, Any]) -> None:
+    """Print the figures of the document: a table of the methods and one of the controls, a row for each."""
+    for title, means, trials in (
+        ("mean of the trials, and the drift in each", figures["mean"], figures["trials"]),
+        ("controls, which have to fail", figures["controls"], figures["controls_by_trial"]),
+    ):
+        columns = [*FIGURES.values(), *(f"drift\n{name}, %" for name in trials)]
+        rows = [
+            [name, *(number(scores[key]) for key in FIGURES), *(_drift_in(trial, name) for trial in trials.values())]
+            for name, scores in means.items()
+        ]
+        print_table(f"wid: {title}", ["method", *columns], rows)
+
+
+def _drift_in(trial: Mapping[str, Scores], name: str) -> str:
+    return number(trial[name]["rate_percent"]) if name in trial else "-"
 
 
 def list_trials(folder: Path) -> list[str]:
