@@ -114,7 +114,8 @@ class Timeline:
         self.state = State(*(array if array is prepared.state.members else next(state) for array in prepared.state))
         self.rolling: Rolling | None = None
         if rolling is not None:
-            self.rolling = rolling._replace(memory=next(state), silent=next(state), back=next(state), given=next(state))
+            memory, silent, returned, given = (next(state) for _ in range(4))
+            self.rolling = rolling._replace(memory=memory, silent=silent, returned=returned, given=given)
         self.joined = None if joined is None else Joint(*state)
 
     def _allocate(self, epochs: int, fixes: int, imus: int) -> None:
