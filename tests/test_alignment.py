@@ -161,7 +161,20 @@ def test_gyro_biases_are_left_alone_on_request() -> None:
     start = found(Recording(rig(), (imu,), start=options))
     np.testing.assert_array_equal(start.imu_errors, 0.0)
     np.testing.assert_array_equal(start.imu_error_std[0], rig().imus[0].start_std())
-    assert start.sources["gyro_bias"] == "configuration"
+    assert start.sources["gyro_bias"].startswith("configuration, std up to ")
+
+
+def test_without_a_standstill_the_filter_believes_the_turn_on_bias() -> None:
+    imu = standing(Rotation.identity(), 12.0)
+    known = replace(rig().imus[0], initial_std=ImuErrors(gyro_bias=np.full(3, 3.0 * DEG)))
+    options = StartOptions(heading=0.0, position=PLACE, static_interval=(0.0, 10.0))
+    measured, not_measured = (
+        found(Recording(Rig((known,)), (imu,), start=replace(options, estimate_gyro_bias=estimated)))
+        for estimated in (True, False)
+    )
+    np.testing.assert_allclose(not_measured.imu_error_std[0, :3], 3.0 * DEG)
+    assert not_measured.sources["gyro_bias"] == "configuration, std up to 3 deg/s"
+    assert np.all(measured.imu_error_std[0, :3] < 0.1 * DEG)
 
 
 # --- standstill -------------------------------------------------------------------------------------------------------

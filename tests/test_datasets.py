@@ -90,6 +90,19 @@ def test_known_names() -> None:
     assert datasets.info("quadrotor")["downloadable"]
 
 
+def test_a_recording_of_a_data_set_is_described(data_folder: Path) -> None:
+    facts = datasets.info("wid/trial08")
+    assert facts == datasets.info("wid/08")
+    assert facts["name"] == "wid/trial08"
+    assert facts["folder"] == str((data_folder / "wid" / "trial08").resolve())
+    assert facts["imus"][-1] == "CAR"  # type: ignore[index]
+    assert (facts["start_s"], facts["end_s"]) == (12.7, 123.3)
+    with pytest.raises(InputError, match="no trial 'trial99'; expected one of trial02"):
+        datasets.info("wid/trial99")
+    with pytest.raises(InputError, match="data set quadrotor: has no recordings by name"):
+        datasets.info("quadrotor/path_1")
+
+
 def test_checksums_are_those_of_the_files(data_folder: Path) -> None:
     import gzip
 

@@ -450,6 +450,7 @@ KINDS = (
     (config.Triple, "three numbers"),
     (config.PerAxis, "number or three"),
     (config.Spread, "number or three, not negative"),
+    (config.PositiveSpread, "number or three above zero"),
     (config.Positive, "number above zero"),
     (config.NotNegative, "number, not negative"),
     (config.Number, "number"),

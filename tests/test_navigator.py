@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from array_recordings import START, Array, shaken_path, shaken_recording, start_at
+from driven_vehicle import drive, without
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from playing import events, feed, navigator_for, play, row, rows
-from test_vehicle import drive, without
 
 from polyins import batch
 from polyins.errors import InputError

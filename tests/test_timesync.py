@@ -147,7 +147,23 @@ def test_the_warning_says_how_many_gaps_and_where_the_longest_is() -> None:
 
 def test_gaps_outside_the_common_span_are_not_spoken_of() -> None:
     early = without(regular(100.0, -5.0, 10.0), (-2.0, -1.0))
-    assert align((stream("a", early), stream("b", regular(100.0)))).warnings == ()
+    assert not [text for text in align((stream("a", early), stream("b", regular(100.0)))).warnings if "gap" in text]
+
+
+def test_an_imu_that_begins_late_is_named() -> None:
+    (warning,) = align((stream("a", regular(100.0)), stream("b", regular(100.0)[150:]))).warnings
+    assert "IMU b: begins at 1.5" in warning
+    assert align((stream("a", regular(100.0)), stream("b", regular(100.0)[50:]))).warnings == ()
+
+
+def test_an_imu_that_stops_early_does_not_end_the_recording() -> None:
+    full = regular(100.0)
+    aligned = align((stream("a", full), stream("b", full), stream("c", full[:-200])))
+    np.testing.assert_array_equal(aligned.time, full)
+    assert aligned.missing[-199:, 2].all()
+    np.testing.assert_allclose(aligned.increments[-199:, :, 2], aligned.increments[-199:, :, :2].mean(axis=2))
+    assert len(aligned.warnings) == 1
+    assert "IMU c" in aligned.warnings[0]
 
 
 def test_streams_that_hardly_overlap_are_refused_by_name() -> None:

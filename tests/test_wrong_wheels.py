@@ -164,6 +164,16 @@ ERRORS: dict[str, tuple[Spoil, str, str]] = {
         r"filter\.rolling\.speed_interval_s: is 0",
         "expected a number above zero",
     ),
+    "window longer than interval": (
+        lambda folder, values: values.update(filter={"rolling": {"speed_window_s": 0.6}}),
+        r"filter\.rolling\.speed_window_s: is 0\.6",
+        "expected at most speed_interval_s, 0.5",
+    ),
+    "speed without error": (
+        lambda folder, values: values.update(filter={"rolling": {"wheel_speed_std_m_s": 0}}),
+        r"filter\.rolling\.wheel_speed_std_m_s: is 0",
+        "expected numbers above zero",
+    ),
     "range of zero": (imu(0, "gyro_range_deg_s", 0), r"imus\[0\]\.gyro_range_deg_s", "expected a number above zero"),
     "plane of what is on one": (
         lambda folder, values: values["gnss"].update(plane_origin={"latitude_deg": 30.0, "longitude_deg": 114.0}),
@@ -259,6 +269,8 @@ def test_command_line_says_it_in_two_lines_and_exits_with_2(
     assert not (tmp_path / "out").exists()
 
 
+SWAPPED = ((0, -0.5, "left"), (1, 0.5, "right"))
+
 WARNINGS: dict[str, tuple[Spoil, str]] = {
     "saturation": (
         both(rows_of("rear-right", clipped), imu(0, "gyro_range_deg_s", 900.0)),
@@ -288,6 +300,30 @@ WARNINGS: dict[str, tuple[Spoil, str]] = {
     "clocks differ": (
         rows_of("rear-left", later),
         r"imus\[1\]: IMU rear-left drives like IMU rear-right \+3\.0 s later",
+    ),
+    "lever arm of nearly the radius": (
+        wheel(0, "lever_arm_m", [0.0, 0.0, 0.28]),
+        r"wheel\.lever_arm_m: is \[0, 0, 0\.28\]; centripetal acceleration says about \[0, -?0\.00\d, -?0\.00\d\]",
+    ),
+    "body a quarter turn off": (
+        imu(3, "mount_deg", [0, 0, 90]),
+        r"imus\[3\]: IMU body looks turned by -90 deg about down",
+    ),
+    "body names its axes wrongly": (
+        imu(3, "axes", ["-y", "x", "z"]),
+        r"imus\[3\]: IMU body looks turned by -90 deg about down",
+    ),
+    "left and right swapped": (
+        both(*(both(imu(k, "position_m", [0, y, 0]), wheel(k, "side", s)) for k, y, s in SWAPPED)),
+        "imus: by the wheels' speeds the vehicle turns the other way than IMU body says; are left and right swapped",
+    ),
+    "gyro with other axes than the accelerometer": (
+        lambda folder, values: write_rows(folder / "body.csv", body_rows()[:, [0, 3, 2, 1, 4, 5, 6]]),
+        r"imus\[3\]\.axes: IMU body turns about its forward axis when the wheels turn the vehicle",
+    ),
+    "GNSS clock off by seconds": (
+        lambda folder, values: values["gnss"].update(clock_offset_s=3.0),
+        r"gnss: fits the wheels with -[23]\.\d\d s added to its stamps",
     ),
     "no side": (
         both(imu(0, "position_m", [0, 0, 0]), lambda folder, values: values["imus"][0]["wheel"].pop("side")),

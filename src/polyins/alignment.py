@@ -131,7 +131,8 @@ class _Search:
         if still and self.options.estimate_gyro_bias:
             self._gyro_biases(still, attitude, position)
         else:
-            self.sources["gyro_bias"] = "configuration"
+            largest = self.error_std[:, :3].max() / DEG
+            self.sources["gyro_bias"] = f"configuration, std up to {largest:.3g} deg/s"
         given = self.options.attitude_std
         return Start(
             time=time,
@@ -222,10 +223,16 @@ class _Search:
         raise InputError("start: no velocity; expected GNSS, a standstill, or start.velocity_m_s")
 
     def _mean(self, begin: float, end: float) -> tuple[Array, Array, float]:
-        """Return the mean rates and specific forces of each IMU, shape (N, 3), biases removed, and the time."""
+        """Return the mean rates and specific forces of each IMU, shape (N, 3), biases removed, and the time.
+
+        What is missing counts only for an IMU that has nothing else there.
+        """
         part = self.aligned.between(begin, end)
         duration = part.time[-1] - part.time[0]
-        mean = part.increments[1:].sum(axis=0).T / duration
+        have = ~part.missing[1:]
+        have[:, ~have.any(axis=0)] = True
+        measured = np.diff(part.time) @ have
+        mean = np.einsum("tki,ti->ik", part.increments[1:], have) / measured[:, None]
         return mean[:, :3] - self.errors[:, :3], mean[:, 3:] - self.errors[:, 3:6], float(duration)
 
     def _roll_pitch(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import alignment, course, engine, modules, timesync
-from polyins.aiding.wheels import Joint, Rolling
+from polyins.aiding.rolling import Joint, Rolling
 from polyins.alignment import Start
 from polyins.engine import Inputs, Outputs, Plan, State
 from polyins.errors import InputError
@@ -178,7 +178,8 @@ def lay_out(
 
 def _start_on_course(row: Method, recording: Recording, aligned: Aligned) -> Start:
     """Find the start of a vehicle whose heading is to come from GNSS."""
-    found = course.find(recording, lambda blind: run(blind, row.name))
+    begin = alignment.find_start(course.blind(recording), aligned).time
+    found = course.find(recording, begin, lambda blind: run(blind, row.name))
     known = replace(recording.start, heading=found.heading, heading_from="value")
     start = alignment.find_start(replace(recording, start=known), aligned)
     std = start.attitude_std
@@ -196,10 +197,13 @@ def _lay_out_rolling(
     members = [
         Member(imus[i], start.imu_errors[i], start.imu_error_std[i], -imus[i].position, np.zeros(3)) for i in order
     ]
-    rolling = modules.rolling(chosen, spans, recording, aligned, start.imu_errors[:, :3])
+    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
+    found, lacking = modules.completed(chosen, imus, aligned.increments, intervals, aligned.missing, start.imu_errors)
+    complete = replace(aligned, increments=found, missing=lacking)
+    rolling = modules.rolling(chosen, spans, recording, complete, start.imu_errors[:, :3])
     joined = modules.joined(len(spans)) if row.joined else None
     plan = build_plan(row, recording, aligned)
-    inputs = build_inputs(recording, replace(aligned, increments=aligned.increments[:, :, order]))
+    inputs = build_inputs(recording, replace(complete, increments=complete.increments[:, :, order]))
     speed = [imus[module[0]] for module in chosen.speed]
     blocks = np.zeros(((len(order) + LANES - 1) // LANES, bank.SIZE))
     blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
@@ -302,18 +306,15 @@ def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, g
     """Put a member where it is mounted, moving as the turning array does: `rate` is its own, rad/s."""
     from scipy.spatial.transform import Rotation
 
-    def put(field: int, values: Array) -> None:
-        w[field + lane : field + lane + len(values) * LANES : LANES] = values
-
     c = alignment.rotation_matrix(start.attitude)
     lever_arm = c @ -member.to_origin
     turning = c @ rate - alignment.earth_rate(start.position, geodetic)
-    put(bank.POSITION, start.position + lever_arm / metres_per_unit(start.position, geodetic))
-    put(bank.VELOCITY, start.velocity + np.cross(turning, lever_arm))
-    put(bank.QUATERNION, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
-    put(bank.ERRORS, member.start_errors)
-    put(bank.TO_ORIGIN, member.to_origin)
-    put(bank.TO_ANTENNA, member.to_antenna)
+    bank.put(w, bank.POSITION, lane, start.position + lever_arm / metres_per_unit(start.position, geodetic))
+    bank.put(w, bank.VELOCITY, lane, start.velocity + np.cross(turning, lever_arm))
+    bank.put(w, bank.QUATERNION, lane, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
+    bank.put(w, bank.ERRORS, lane, member.start_errors)
+    bank.put(w, bank.TO_ORIGIN, lane, member.to_origin)
+    bank.put(w, bank.TO_ANTENNA, lane, member.to_antenna)
 
 
 def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None:

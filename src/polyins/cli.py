@@ -168,7 +168,9 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
         print(results.as_json(result.document))
         return
     alone = "wheel-ins" if recording.rig.rolling else "single"
-    title = f"{recording.name}; {alone}: rms over {len(result.each)} IMUs; sqrt(N) = {result.document['sqrt_n']:.2f}"
+    title = f"{recording.name}; {alone}: rms over {len(result.each)} "
+    # on a vehicle nothing says that N modules are better by that much
+    title += "wheels" if recording.rig.rolling else f"IMUs; sqrt(N) = {result.document['sqrt_n']:.2f}"
     print_summaries(title, result.document["methods"], result.document["ratio_to_single"])
     say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
 

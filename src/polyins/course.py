@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 LENGTH = 50.0
 """m of track that are compared; farther on dead reckoning bends"""
+FARTHER = 1.3
+"""That many times the length by GNSS is farther than it by dead reckoning, whose radii may be wrong by a tenth."""
 SHORTEST = 5.0
 LEAST_STD = 0.1 * DEG
 
@@ -41,16 +43,23 @@ def is_wanted(recording: Recording) -> bool:
     )
 
 
-def find(recording: Recording, navigate: Callable[[Recording], Solution]) -> Course:
+def blind(recording: Recording) -> Recording:
+    """Return the recording without GNSS, starting with heading zero."""
+    assert recording.gnss is not None
+    origin = recording.gnss.position[0] if recording.start.position is None else recording.start.position
+    start = replace(recording.start, heading=0.0, heading_from="value", position=origin)
+    return replace(recording, gnss=None, outages=(), start=start)
+
+
+def find(recording: Recording, begin: float, navigate: Callable[[Recording], Solution]) -> Course:
     """Dead-reckon with heading zero by `navigate` and fit the track to GNSS; raise InputError if it is too short.
 
-    The rotation is the one of least squares in the horizontal plane, robust against single wrong fixes.
+    `begin`: when the run starts, s. The rotation is the one of least squares in the horizontal plane, robust against
+    single wrong fixes.
     """
-    gnss = recording.gnss
+    gnss, alone = recording.gnss, blind(recording)
     assert gnss is not None
-    origin = gnss.position[0] if recording.start.position is None else recording.start.position
-    blind = replace(recording.start, heading=0.0, heading_from="value", position=origin)
-    solution = navigate(replace(recording, gnss=None, outages=(), start=blind))
+    solution = navigate(replace(alone, start=replace(alone.start, end_time=_end(recording, gnss, begin))))
     track, fixes = _pairs(recording, gnss, solution)
     reach = float(np.max(np.linalg.norm(track - track[:1], axis=1), initial=0.0))
     if reach < SHORTEST:
@@ -65,6 +74,20 @@ def find(recording: Recording, navigate: Callable[[Recording], Solution]) -> Cou
     spread = np.sqrt(np.sum((track[kept] - track[kept].mean(axis=0)) ** 2))
     std = max(LEAST_STD, float(np.sqrt(np.mean(residual[kept] ** 2)) / spread * np.sqrt(2.0)))
     return Course(angle, std, f"dead-reckoned track turned onto GNSS over {reach:.0f} m")
+
+
+def _end(recording: Recording, gnss: GnssStream, begin: float) -> float | None:
+    """Return when the first stretch is surely over: as soon as three fixes in a row are far enough from its begin."""
+    ahead = gnss.time >= begin
+    time, position = gnss.time[ahead], gnss.position[ahead]
+    if not len(time):
+        return recording.start.end_time
+    way = np.linalg.norm(displacement(position, position[0], recording.geodetic)[:, :2], axis=1)
+    far = way > FARTHER * LENGTH + 10.0 * float(gnss.position_std[:, :2].max())
+    lasting = np.flatnonzero(far[:-2] & far[1:-1] & far[2:]) + 2
+    known = np.inf if recording.start.end_time is None else recording.start.end_time
+    end = min(known, float(time[lasting[0]]) if len(lasting) else np.inf)
+    return end if np.isfinite(end) else None
 
 
 def _pairs(recording: Recording, gnss: GnssStream, solution: Solution) -> tuple[Array, Array]:

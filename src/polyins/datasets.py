@@ -80,7 +80,13 @@ def names() -> list[str]:
 
 
 def info(name: str) -> dict[str, object]:
-    """Return what is known of a data set: summary, licence, source, number of files, the folder if it is here."""
+    """Return what is known of a data set: summary, licence, source, number of files, the folder if it is here.
+
+    Of a recording of the data set WID, such as `wid/trial08`, in addition its IMUs and when it starts and ends, s.
+    """
+    name, _, trial = name.partition("/")
+    if trial:
+        return _recording_info(name, trial)
     dataset = _known(name)
     local = _given_folder(name) or (_cache_folder(name) if _complete(name) else None)
     return {
@@ -91,6 +97,22 @@ def info(name: str) -> dict[str, object]:
         "downloadable": dataset.address is not None,
         "files": len(_registry(name)) or None,
         "folder": str(local) if local else None,
+    }
+
+
+def _recording_info(name: str, trial: str) -> dict[str, object]:
+    known = info(name)
+    if name != "wid":
+        raise InputError(f"data set {name}: has no recordings by name; expected {name} alone")
+    values = _wid_configuration(fetch(name), trial, gnss=False)
+    folder = fetch(name) / f"trial{trial.removeprefix('trial')}"
+    return known | {
+        "name": f"{name}/{folder.name}",
+        "files": sum(path.is_file() for path in folder.iterdir()),
+        "folder": str(folder),
+        "imus": [imu["name"] for imu in values["imus"]],
+        "start_s": values["start"]["time_s"],
+        "end_s": values["start"]["end_time_s"],
     }
 
 

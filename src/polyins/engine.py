@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from polyins.aiding import gnss, wheels
-from polyins.aiding.wheels import Joint, Rolling
+from polyins.aiding import gnss, measurement, schedule, silence, vehicle_position
+from polyins.aiding.rolling import Joint, Rolling
 from polyins.kernels import bank, dense, earth, fuse, joint, kalman, share, strapdown, vehicle
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, kernel
@@ -209,7 +209,7 @@ def aid_by_position(
     if origin is not None:
         nis = _measure_position(state, fix)
     if rolling is not None:
-        nis = wheels.measure_position(fix, blocks, groups, members, measurements, state.near, rolling, joined)
+        nis = vehicle_position.measure_position(fix, blocks, groups, members, measurements, state.near, rolling, joined)
     _record(state, nis, innovation, rolling, joined)
     status = ACCEPTED
     if not _passes_gate(state, plan, nis, rolling, joined):
@@ -227,7 +227,9 @@ def aid_by_position(
     if rolling is not None:
         dt = state.clock[1]
         now = state.clock[0]
-        wheels.correct_by_position(blocks, groups, members, measurements, state.near, rolling, joined, now, dt)
+        vehicle_position.correct_by_position(
+            blocks, groups, members, measurements, state.near, rolling, joined, now, dt
+        )
     return status
 
 
@@ -399,7 +401,7 @@ def begin(
     if rolling is None:
         merge(state.blocks, state.groups, state.members, state.clock[1])
     else:
-        wheels.settle(state.blocks, state.groups, state.members, rolling, state.clock[1])
+        measurement.update_derived(state.blocks, state.groups, state.members, rolling, state.clock[1])
 
 
 @kernel
@@ -481,7 +483,7 @@ def run_epochs(
         now, end = time[k - 1], time[k]
         interval = end - now
         if rolling is not None:
-            wheels.fall_silent(k, now, rolling)
+            silence.note_silence(k, now, rolling)
         if not virtual:
             load(blocks, increments[k])
         if origin is not None and virtual:
@@ -500,10 +502,10 @@ def run_epochs(
         propagate(blocks, groups, members, near, clock, shared, fraction, end - now, work, origin, rolling, joined)
         if rolling is not None:
             measurements = state.measurements
-            wheels.watch(k, fraction, blocks, groups, members, rolling, end - now)
+            schedule.fill_window(k, fraction, blocks, groups, members, rolling, end - now)
             if rolling.present.shape[0] > 0:
-                wheels.carry(k, end, blocks, groups, members, near, rolling, joined, interval)
-            wheels.step(k, end, blocks, groups, members, measurements, near, rolling, joined, end - now, interval)
+                silence.move_silent(k, end, blocks, groups, members, near, rolling, joined, interval)
+            schedule.step(k, end, blocks, groups, members, measurements, near, rolling, joined, end - now, interval)
         while next_fix <= end + snap:
             if fixes is not None:
                 aid(state, plan, fixes, outputs, inputs.velocities, origin, rolling, joined)

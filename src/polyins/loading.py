@@ -11,7 +11,7 @@ import numpy as np
 from polyins import datasets
 from polyins.config import Config, Rolling, parse
 from polyins.errors import InputError
-from polyins.io import checks, clocks, kf_gins_configuration, wheel_checks, wheel_ins_configuration
+from polyins.io import checks, clocks, faults, kf_gins_configuration, wheel_checks, wheel_ins_configuration
 from polyins.io.imu_stream import read_imu
 from polyins.io.position_stream import read_gnss, read_reference
 from polyins.io.timing import outage_intervals, start_options
@@ -70,6 +70,7 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     read = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
     imus, streams, warnings = zip(*read, strict=True)
     notes += _one_by_kind([text for texts in warnings for text in texts])
+    faults.check_alive(streams)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
     notes += [clocks.described(offset) for offset in offsets]
     span = checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})

@@ -78,5 +78,8 @@ def find_method(name: str) -> Method:
     row = METHODS[base]
     if words and not row.rolling:
         raise InputError(f"method: {name!r}; expected nothing after {base!r}")
+    for word in words:
+        if words.count(word) > 1:
+            raise InputError(f"method: {name!r} says {word!r} twice; expected it once")
     chosen = tuple(word for word in words if word != CENTRALIZED)
     return replace(row, name=name, joined=CENTRALIZED in words, chosen=chosen)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import alignment
-from polyins.aiding import wheels
-from polyins.aiding.wheels import Joint, Rolling
+from polyins.aiding import rolling as places
+from polyins.aiding.rolling import Joint, Rolling
 from polyins.alignment import Start
 from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
@@ -68,6 +68,7 @@ def choose(row: Method, rig: Rig) -> Modules:
     speed = tuple(wheels_[: row.wheels])
     body = tuple(bodies[: row.bodies])
     _check_enough(row, len(wheels_), len(bodies))
+    _check_taken(row, [i for module in (*speed, *body) for i in module], rig)
     return Modules((*speed, *body) if row.wheels_navigate else body, speed)
 
 
@@ -92,6 +93,18 @@ def _check_enough(row: Method, wheels_: int, bodies: int) -> None:
         raise InputError(f"method: {row.name} needs an IMU on the body; expected one without `wheel` among the imus")
 
 
+def _check_taken(row: Method, taken: list[int], rig: Rig) -> None:
+    """Raise InputError for a name that the method has no place for."""
+    names = {name for i in taken for name in (rig.imus[i].name, rig.imus[i].module)}
+    for word in row.chosen:
+        if word not in names:
+            wheels_, bodies = ("any" if count > 2 else str(count) for count in (row.wheels, row.bodies))
+            raise InputError(
+                f"method: {row.name} has no place for {word!r}; "
+                f"expected modules on wheels: {wheels_}, on the body: {bodies}"
+            )
+
+
 def available(rig: Rig) -> list[str]:
     """Return the methods with wheels that a rig has the modules for."""
     from polyins.methods import METHODS
@@ -105,6 +118,51 @@ def available(rig: Rig) -> list[str]:
                 continue
             names.append(row.name)
     return names
+
+
+def completed(
+    modules: Modules,
+    imus: tuple[Imu, ...],
+    increments: Array,
+    intervals: Array,
+    missing: NDArray[np.bool_],
+    errors: Array,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Give a chip that is silent what the other chips of its module measure, so that the module goes on.
+
+    `increments` is (T, 6, N), `intervals` (T,), `missing` (T, N), `errors`, the slow ones at the start, (N, 12).
+    Returns the increments and what is still missing.
+    """
+    found, lacking = increments.copy(), missing.copy()
+    for module in dict.fromkeys((*modules.navigate, *modules.speed)):
+        for i in module:
+            others = [j for j in module if j != i]
+            epochs = np.flatnonzero(missing[:, i] & ~missing[:, others].all(axis=1))
+            if len(epochs):
+                part = increments[epochs][:, :, others], intervals[epochs, None], ~missing[epochs][:, others]
+                found[epochs, :, i] = _from_others(i, others, imus, *part, errors)
+                lacking[epochs, i] = False
+    return found, lacking
+
+
+def _from_others(
+    i: int,
+    others: list[int],
+    imus: tuple[Imu, ...],
+    increments: Array,
+    intervals: Array,
+    have: NDArray[np.bool_],
+    errors: Array,
+) -> Array:
+    """Return what chip i would measure, with its own biases and at its own place, shape (K, 6)."""
+    weights = have / have.sum(axis=1, keepdims=True)
+    found = np.einsum("tkj,tj->tk", increments, weights)
+    found -= weights @ (errors[others, :6] - errors[i, :6]) * intervals
+    spots = np.array([imu.position if imu.wheel is None else -imu.wheel.lever_arm for imu in imus])
+    apart = spots[i] - weights @ spots[others]
+    rate = found[:, :3] / intervals - errors[i, :3]
+    found[:, 3:] += np.cross(rate, np.cross(rate, apart)) * intervals
+    return np.asarray(found)
 
 
 def lanes(modules: Modules) -> tuple[list[tuple[int, int]], list[int]]:
@@ -138,9 +196,9 @@ def rolling(
     bodies = [s for s, module in enumerate(here) if imus[module[0]].wheel is None]
     intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
     missing = aligned.missing
-    memory = np.zeros(wheels.MEMORY)
-    memory[wheels.LAST_SPEED] = memory[wheels.LAST_POINT] = aligned.time[0]
-    memory[wheels.WATCHED] = -1.0
+    memory = np.zeros(places.MEMORY)
+    memory[places.LAST_SPEED] = memory[places.LAST_POINT] = aligned.time[0]
+    memory[places.FILLED] = -1.0
     return Rolling(
         lenders=np.array([bodies[0] if bodies and s not in bodies else -1 for s in range(len(here))], dtype=np.int64),
         noise=np.array([options.body_speed_std if s in bodies else options.wheel_speed_std for s in range(len(here))])
@@ -149,25 +207,24 @@ def rolling(
         antenna=recording.rig.antenna,
         travel=travel(modules, recording.rig, aligned.increments, intervals, missing, start_bias),
         present=present(modules, missing if missing.any() else missing[:0]),
-        drift=np.zeros((len(here), 3)),
         memory=memory,
         silent=np.full(len(here), -1.0),
-        back=np.full(len(here), -1.0),
-        given=np.zeros(wheels.GIVEN),
+        returned=np.full(len(here), -1.0),
+        given=np.zeros(places.GIVEN),
     )
 
 
 def _settings(options: RollingOptions) -> Array:
-    settings = np.zeros(wheels.SETTINGS)
-    settings[wheels.SPEED_INTERVAL] = options.speed_interval
-    settings[wheels.SPEED_WINDOW] = options.speed_window
-    settings[wheels.POINT_INTERVAL] = options.constraint_interval
-    settings[wheels.AT_END] = float(options.predict == "end")
-    settings[wheels.STANDSTILL] = float(options.standstill)
-    settings[wheels.POINT_VARIANCE] = options.constraint_std**2
-    settings[wheels.ZERO_VELOCITY_VARIANCE] = ZERO_VELOCITY_STD**2
-    settings[wheels.ZERO_RATE_VARIANCE] = ZERO_RATE_STD**2
-    settings[wheels.STILL_RATE] = STILL_RATE
+    settings = np.zeros(places.SETTINGS)
+    settings[places.SPEED_INTERVAL] = options.speed_interval
+    settings[places.SPEED_WINDOW] = options.speed_window
+    settings[places.POINT_INTERVAL] = options.constraint_interval
+    settings[places.AT_END] = float(options.predict == "end")
+    settings[places.STANDSTILL] = float(options.standstill)
+    settings[places.POINT_VARIANCE] = options.constraint_std**2
+    settings[places.ZERO_VELOCITY_VARIANCE] = ZERO_VELOCITY_STD**2
+    settings[places.ZERO_RATE_VARIANCE] = ZERO_RATE_STD**2
+    settings[places.STILL_RATE] = STILL_RATE
     return settings
 
 
@@ -218,7 +275,7 @@ def joined(shares: int) -> Joint:
         gain=np.zeros((3, size)),
         ah=np.zeros((3, size)),
         rows=np.zeros((shares, 3, size)),
-        learned=np.zeros(size),
+        correction=np.zeros(size),
         z=np.zeros(3),
         work=np.zeros(joint.SIZE),
     )
@@ -231,21 +288,18 @@ def fill_lane(w: Array, lane: int, imu: Imu, start: Start, attitude: Array, erro
     """
     from scipy.spatial.transform import Rotation
 
-    def put(field: int, values: Array) -> None:
-        w[field + lane : field + lane + len(values) * LANES : LANES] = values
-
     c = alignment.rotation_matrix(attitude)
     to_wheel = np.zeros(3) if imu.wheel is None else imu.wheel.lever_arm
     place = alignment.rotation_matrix(start.attitude) @ imu.position - c @ to_wheel
-    put(bank.POSITION, start.position + place / metres_per_unit(start.position, geodetic))
-    put(bank.VELOCITY, start.velocity)
-    put(bank.QUATERNION, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
-    put(bank.ERRORS, errors)
-    put(bank.WHEEL, np.array([0.0 if imu.wheel is None else imu.wheel.radius]))
-    put(bank.TO_WHEEL, to_wheel)
-    put(bank.IN_VEHICLE, imu.position)
+    bank.put(w, bank.POSITION, lane, start.position + place / metres_per_unit(start.position, geodetic))
+    bank.put(w, bank.VELOCITY, lane, start.velocity)
+    bank.put(w, bank.QUATERNION, lane, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
+    bank.put(w, bank.ERRORS, lane, errors)
+    bank.put(w, bank.WHEEL, lane, np.array([0.0 if imu.wheel is None else imu.wheel.radius]))
+    bank.put(w, bank.TO_WHEEL, lane, to_wheel)
+    bank.put(w, bank.IN_VEHICLE, lane, imu.position)
     beside = np.array([imu.position[1], 0.0, 0.0])
-    put(bank.TO_SPEED, -imu.position if imu.wheel is None else to_wheel - beside)
+    bank.put(w, bank.TO_SPEED, lane, -imu.position if imu.wheel is None else to_wheel - beside)
 
 
 def mounting_std(imu: Imu, speed: list[Imu]) -> Array:
@@ -259,12 +313,36 @@ def mounting_std(imu: Imu, speed: list[Imu]) -> Array:
 
 
 def silences(modules: Modules, recording: Recording, aligned: Aligned) -> tuple[str, ...]:
-    """Return in words which IMUs were silent for how long, among those of `modules.all`."""
+    """Return in words which IMUs were silent for how long, among those of `modules.all`, and what became of them."""
     found = []
     for i, imu in enumerate(recording.rig.imus):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], aligned.missing[:, i].astype(int), [0]])))
-        for first, end in zip(edges[::2], edges[1::2], strict=True):
+        for first, end in _stretches(aligned.missing[:, i]):
             begin, last = aligned.time[max(first - 1, 0)], aligned.time[end - 1]
-            driving = "the others carried it along" if len(modules.navigate) > 1 else "it coasted"
-            found.append(f"IMU {imu.name}: silent for {last - begin:.2f} s from {begin:.2f} s; {driving}")
+            outcome = _outcome(modules, i, aligned, first, end)
+            found.append(f"IMU {imu.name}: silent for {last - begin:.2f} s from {begin:.2f} s; {outcome}")
     return tuple(found)
+
+
+def _outcome(modules: Modules, i: int, aligned: Aligned, first: int, end: int) -> str:
+    """Say what a vehicle did while one of its IMUs was silent, in epochs first ... end - 1."""
+
+    def silent(module: tuple[int, ...]) -> NDArray[np.bool_]:
+        return np.asarray(aligned.missing[first:end, module].all(axis=1))
+
+    (own,) = {module for module in (*modules.navigate, *modules.speed) if i in module}
+    every = np.all([silent(module) for module in modules.navigate], axis=0)
+    if not silent(own).any():
+        return "its module went on without it"
+    if own not in modules.navigate:
+        return "the others gave the speed" if len(modules.speed) > 1 else "there was no wheel speed"
+    if every.all():
+        return "the vehicle coasted"
+    if every.any():
+        alone = float(np.sum(np.diff(aligned.time, prepend=aligned.time[0])[first:end][every]))
+        return f"for {alone:.2f} s of it every IMU was, and the vehicle coasted"
+    return "the others carried it along"
+
+
+def _stretches(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
+    return [(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]

@@ -255,6 +255,7 @@ class Navigator:
 
     def _take(self, epoch: Epoch) -> None:
         if self._timeline is not None:
+            epoch = self._completed(epoch, self._timeline)
             self._timeline.append(epoch.time, epoch.increments[:, self._order], *self._wheels(epoch))
         elif self._first is not None:
             self._begin(self._first, epoch)
@@ -281,6 +282,20 @@ class Navigator:
         if line.insert(time, fix, velocity):
             return ""
         return BEFORE_START if line.whole else LATE
+
+    def _completed(self, epoch: Epoch, line: Timeline) -> Epoch:
+        """Give chips that are silent what the others of their module measure."""
+        if self._modules is None or not epoch.missing.any():
+            return epoch
+        increments, missing = modules.completed(
+            self._modules,
+            self._recording.rig.imus,
+            epoch.increments[None],
+            np.array([epoch.time - line.time]),
+            epoch.missing[None],
+            self.start.imu_errors,
+        )
+        return Epoch(epoch.time, increments[0], missing[0])
 
     def _wheels(self, epoch: Epoch) -> tuple[Array, NDArray[np.bool_]] | tuple[()]:
         """Return what the wheels rolled in an epoch, and which modules have data."""

@@ -167,7 +167,8 @@ class Imu:
     """Where it sits in the array frame, m, from the array origin; on a wheel: where the wheel's centre is."""
     initial_errors: ImuErrors = field(default_factory=ImuErrors)
     initial_std: ImuErrors | None = None
-    """How sure `initial_errors` is; None: the noise grade's steady-state values."""
+    """How sure `initial_errors` is; None: the noise grade's steady-state values. That of the gyro bias is the chip's
+    turn-on bias: a standstill that shows the bias itself takes its place."""
     wheel: Wheel | None = None
     """None: it is fixed to the body"""
     module: str = ""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import engine
-from polyins.aiding.wheels import Joint, Rolling
+from polyins.aiding.rolling import Joint, Rolling
 from polyins.batch import Prepared, build_outputs
 from polyins.engine import Inputs, Outputs, Plan, State
 
@@ -100,7 +100,7 @@ class Timeline:
         changing: list[NDArray[np.generic]] = [array for array in prepared.state if array is not prepared.state.members]
         rolling, joined = prepared.rolling, prepared.joined
         if rolling is not None:
-            changing += [rolling.memory, rolling.silent, rolling.back, rolling.given]
+            changing += [rolling.memory, rolling.silent, rolling.returned, rolling.given]
         if joined is not None:
             changing += list(joined)
         ends = np.cumsum([-(-array.size // ALIGNMENT) * ALIGNMENT for array in changing])
@@ -114,7 +114,8 @@ class Timeline:
         self.state = State(*(array if array is prepared.state.members else next(state) for array in prepared.state))
         self.rolling: Rolling | None = None
         if rolling is not None:
-            self.rolling = rolling._replace(memory=next(state), silent=next(state), back=next(state), given=next(state))
+            memory, silent, returned, given = (next(state) for _ in range(4))
+            self.rolling = rolling._replace(memory=memory, silent=silent, returned=returned, given=given)
         self.joined = None if joined is None else Joint(*state)
 
     def _allocate(self, epochs: int, fixes: int, imus: int) -> None:

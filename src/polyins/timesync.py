@@ -12,7 +12,8 @@ from polyins.recording import ImuStream
 
 Array = NDArray[np.float64]
 
-LATE_END = 1.0  # s
+LATE = 1.0
+"""s: an IMU that begins so long after the others is waited for, one that ends so long before them is not"""
 
 GAP = 3.5
 """An interval longer than this many nominal ones is a gap: what was measured in it is lost."""
@@ -50,10 +51,10 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
     the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Raises
     InputError if less than two seconds are common.
     """
-    time = _common_time(streams, bridge)
+    time = _common_time(streams)
     increments = np.empty((len(time), 6, len(streams)))
     missing = np.zeros((len(time), len(streams)), dtype=bool)
-    warnings: list[str] = []
+    warnings = _late(streams)
     for i, stream in enumerate(streams):
         values = np.hstack([stream.dtheta, stream.dvel])
         if len(stream.time) == len(time) and np.array_equal(stream.time, time):
@@ -63,7 +64,7 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
         gaps = _gaps(stream.time)
         gaps = [g for g in gaps if g[1] > time[0] and g[0] < time[-1]]
         stops = float(stream.time[-1])
-        if time[-1] - stops > LATE_END:
+        if time[-1] - stops > LATE:
             gaps.append((stops, float(time[-1])))
         for begin, end in gaps:
             missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
@@ -78,14 +79,32 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
     return Aligned(time, increments, tuple(warnings), missing)
 
 
-def _common_time(streams: tuple[ImuStream, ...], bridge: bool) -> Array:
+def _late(streams: tuple[ImuStream, ...]) -> list[str]:
+    """Say which IMU the others have to wait for."""
+    begins = np.array([stream.time[0] for stream in streams])
+    latest = int(np.argmax(begins))
+    wait = float(begins[latest] - begins.min())
+    if wait <= LATE:
+        return []
+    return [
+        f"IMU {streams[latest].name}: begins at {begins[latest]:.3f} s, {wait:.1f} s after the first one; what the"
+        " others measured before is not used"
+    ]
+
+
+def common_end(ends: Array) -> float:
+    """Return when a recording ends whose streams end then, s; one that stops long before others has a gap."""
+    return float(ends[ends > ends.max() - LATE].min())
+
+
+def _common_time(streams: tuple[ImuStream, ...]) -> Array:
     """Return the stamps of the stream with the fewest gaps, filled up in them with those of others.
 
-    Without `bridge` the time goes on where a stream ends for good while others go on.
+    The time goes on where a stream ends for good while others go on.
     """
     begin = max(stream.time[0] for stream in streams)
     ends = np.array([stream.time[-1] for stream in streams])
-    end = float(ends.min() if bridge else ends[ends > ends.max() - LATE_END].min())
+    end = common_end(ends)
     if min(end, ends.min()) - begin < 2.0:
         spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
         raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")

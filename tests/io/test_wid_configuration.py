@@ -40,7 +40,7 @@ def test_rig(recording: Recording) -> None:
     np.testing.assert_allclose(wheels["IMU2"].noise.gyro_scale_std, [3e-3, 1e-4, 1e-4])
     np.testing.assert_allclose(wheels["IMU2"].start_std()[3:6], [0.5, 0.3, 0.3])
     np.testing.assert_allclose(wheels["IMU2"].start_std()[6:9], [0.005, 0.003, 0.003])
-    np.testing.assert_allclose(rig.imus[-1].start_std()[:6], [100 / 3600 * DEG] * 3 + [0.05] * 3)
+    np.testing.assert_allclose(rig.imus[-1].start_std()[:6], [3.0 * DEG] * 3 + [0.05] * 3)
     np.testing.assert_allclose(rig.antenna, [0.32, 0.21, 0.0])
 
 

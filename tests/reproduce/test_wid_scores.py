@@ -1,5 +1,6 @@
 """How a solution of the data set WID is scored, on a drive whose errors are known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from synthetic_solutions import GRADE, drive, solution
 from polyins.errors import InputError
 from polyins.recording import ImuStream, Recording, Reference
 from polyins.reproduce import wid
+from polyins.reproduce.targets import print_document
 from polyins.reproduce.wid import Track, Trial
 from polyins.rig import Imu, Rig
 
@@ -113,3 +115,16 @@ def test_smoke_tests_are_no_trials(tmp_path):
     calibration.write_text("trials:\n  '06': {role: smoke test only}\n")
     with pytest.raises(InputError, match="lists no trial to score"):
         wid.list_trials(tmp_path)
+
+
+def test_the_tables_have_a_row_per_method(capsys):
+    scores = {"rate_percent": 0.274, "rate_50m_percent": 0.296, "end_percent": 0.364, "heading_rmse_deg": None}
+    methods = {"wheel-ins/IMU2": scores, "triple-ins": scores}
+    trials = {"02": methods, "09": {"triple-ins": scores | {"rate_percent": 0.5}}}
+    figures = {"mean": methods, "trials": trials, "controls": {}, "controls_by_trial": {"02": {}}}
+    print_document({"target": "wid", "polyins": figures, "paper": {}})
+    printed = capsys.readouterr().out
+    (row,) = (line for line in printed.splitlines() if "triple-ins" in line)
+    assert re.findall(r"-?\d\.\d+|-(?!\w)", row) == ["0.27", "0.30", "0.36", "-", "0.27", "0.50"]
+    (row,) = (line for line in printed.splitlines() if "wheel-ins/IMU2" in line)
+    assert re.findall(r"-?\d\.\d+|-(?!\w)", row)[-1] == "-"

@@ -43,7 +43,7 @@ def residual(
     """Predicted less known position of the point, m north, east, down."""
     x, y, z = vehicle.lever_to_wheel(w, lane)
     n, e, d = vehicle.rotated(vehicle.lane_matrix(w, bank.MATRIX + lane), x, y, z)
-    pn, pe, pd = _in_vehicle(w, lane, vehicle.seen_by_lane(w, lane, lent), point)
+    pn, pe, pd = _in_vehicle(w, lane, vehicle.vehicle_matrix(w, lane, lent), point)
     east = w[bank.POSITION + LANES + lane] - position[1]
     if geodetic:
         east -= 2.0 * math.pi * math.floor(east / (2.0 * math.pi) + 0.5)

@@ -18,13 +18,13 @@ def open_window(w: Array, lane: int, lent: vehicle.Matrix, lateral: float) -> No
     for k in range(3):
         w[bank.TRAVELLED + k * LANES + lane] = 0.0
         w[bank.TURNED + k * LANES + lane] = 0.0
-    _remember(w, lane, vehicle.seen_by_lane(w, lane, lent), _point(w, lane, lateral))
+    _remember(w, lane, vehicle.vehicle_matrix(w, lane, lent), _point(w, lane, lateral))
 
 
 @kernel
-def watch(w: Array, lane: int, lent: vehicle.Matrix, lateral: float, dt: float) -> None:
+def fill_window(w: Array, lane: int, lent: vehicle.Matrix, lateral: float, dt: float) -> None:
     """Add what the point travelled during the last epoch, in vehicle axes of the middle of the epoch."""
-    v = vehicle.seen_by_lane(w, lane, lent)
+    v = vehicle.vehicle_matrix(w, lane, lent)
     point = _point(w, lane, lateral)
     n = point[0] - w[bank.BEFORE_POINT + lane]
     e = point[1] - w[bank.BEFORE_POINT + LANES + lane]
@@ -83,7 +83,7 @@ def residual_at_end(
     )
     un, ue, ud = vehicle.cross(rn - w[bank.EARTH_RATE + lane], re, rd - w[bank.EARTH_RATE + LANES + lane], n, e, d)
     x, y, z = vehicle.rotated_back(
-        vehicle.seen_by_lane(w, lane, lent),
+        vehicle.vehicle_matrix(w, lane, lent),
         w[bank.VELOCITY + lane] + un,
         w[bank.VELOCITY + LANES + lane] + ue,
         w[bank.VELOCITY + 2 * LANES + lane] + ud,

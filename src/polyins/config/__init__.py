@@ -16,7 +16,7 @@ from polyins.config.columns import (
     TrackColumns,
     VelocityColumns,
 )
-from polyins.config.fields import NotNegative, Number, Pair, PerAxis, Positive, Section, Spread, Triple
+from polyins.config.fields import NotNegative, Number, Pair, PerAxis, Positive, PositiveSpread, Section, Spread, Triple
 from polyins.config.file import Config, Filter, parse, validated
 from polyins.config.imu import NOISE_GRADES, ImuEntry, ImuSettings, InitialErrors, InitialStd, Noise
 from polyins.config.positions import GeodeticPoint, GnssEntry, ReferenceEntry
@@ -47,6 +47,7 @@ __all__ = [
     "PerAxis",
     "PositionColumns",
     "Positive",
+    "PositiveSpread",
     "ReferenceEntry",
     "Rolling",
     "RowChoice",

@@ -43,6 +43,12 @@ def _not_negative(value: Any) -> Any:
     return value
 
 
+def _all_positive(value: tuple[float, ...]) -> tuple[float, ...]:
+    if min(value) <= 0.0:
+        raise ValueError("expected numbers above zero")
+    return value
+
+
 def _positive(value: float) -> float:
     if value <= 0.0:
         raise ValueError("expected a number above zero")
@@ -64,6 +70,10 @@ PerAxis = Annotated[tuple[float, float, float], BeforeValidator(_one_or_three)]
 """One number or three; held as three."""
 Spread = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _not_negative(_one_or_three(value)))]
 """Standard deviations: one number or three, none negative; held as three."""
+PositiveSpread = Annotated[
+    tuple[float, float, float], BeforeValidator(lambda value: _all_positive(_one_or_three(value)))
+]
+"""Standard deviations that a filter divides by: one number or three above zero; held as three."""
 Column = str | int
 """A column's name, or its number counted from 1 where a file has no header."""
 ThreeColumns = tuple[Column, Column, Column]

@@ -100,7 +100,7 @@ class InitialStd(Section):
     """How sure the initial errors are, 1 sigma; what is not given is as in `noise`."""
 
     gyro_bias_deg_s: Spread | None = None
-    """deg/s"""
+    """deg/s, the chip's turn-on bias; unused where a standstill at the start shows the bias itself"""
     accel_bias_m_s2: Spread | None = None
     """m/s^2"""
     gyro_scale_ppm: Spread | None = None

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
-from polyins.config.fields import ORIGIN, NotNegative, Pair, Positive, Section, Spread, Triple
+from pydantic import model_validator
+
+from polyins.config.fields import ORIGIN, NotNegative, Pair, Positive, PositiveSpread, Section, Triple, blame
 from polyins.recording import RollingOptions
 from polyins.rig import Vector
 
@@ -50,9 +52,9 @@ class Rolling(Section):
     """the speed is the mean over this time before the update, s"""
     predict: Literal["window", "end"] = "window"
     """compare the mean speed with the mean velocity over the same window, or with the velocity at its end"""
-    wheel_speed_std_m_s: Spread = _three(SPEED.wheel_speed_std)
+    wheel_speed_std_m_s: PositiveSpread = _three(SPEED.wheel_speed_std)
     """forward, right, down, of IMUs on wheels, m/s"""
-    body_speed_std_m_s: Spread = _three(SPEED.body_speed_std)
+    body_speed_std_m_s: PositiveSpread = _three(SPEED.body_speed_std)
     """forward, right, down, of IMUs on the body, m/s"""
     constraint_interval_s: Positive = SPEED.constraint_interval
     """from one update by the reference point to the next, s"""
@@ -60,3 +62,10 @@ class Rolling(Section):
     """of each component of the reference point, m"""
     standstill: bool = SPEED.standstill
     """look for standstills and update by zero velocity and zero rate there"""
+
+    @model_validator(mode="after")
+    def _window_fits(self) -> Self:
+        window, interval = self.speed_window_s, self.speed_interval_s
+        if window <= interval:
+            return self
+        raise blame("speed_window_s", f"is {window:g}; expected at most speed_interval_s, {interval:g}")

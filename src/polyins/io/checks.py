@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from polyins.errors import InputError
 from polyins.io.rows import ImuRows, Source, Track
 from polyins.recording import Array
+from polyins.timesync import common_end
 
 Axes = tuple[str, str, str]
 
@@ -142,12 +143,15 @@ def check_std(source: Source, std: Array) -> None:
 
 
 def check_common_span(spans: dict[str, tuple[float, float]]) -> tuple[float, float]:
-    """Return the span that all IMUs cover, s; raise InputError if it is shorter than 2 s."""
+    """Return the span of the recording, s; raise InputError if all IMUs have less than 2 s in common.
+
+    It begins when all measure. One that stops long before the others does not end it.
+    """
     latest = max(spans, key=lambda name: spans[name][0])
     earliest = min(spans, key=lambda name: spans[name][1])
     begin, end = spans[latest][0], spans[earliest][1]
     if end - begin >= MIN_COMMON_S:
-        return begin, end
+        return begin, common_end(np.array([span[1] for span in spans.values()]))
     if latest == earliest:
         raise InputError(f"IMU {latest}: {end - begin:.3f} s of data; expected at least {MIN_COMMON_S:g} s")
     raise InputError(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from polyins.config import ImuEntry, InitialErrors, InitialStd, Noise
 from polyins.errors import InputError
 from polyins.io import checks, kf_gins, table, xsens_dot
+from polyins.io.faults import clipped, without_faults
 from polyins.io.files import find
 from polyins.io.recognize import imu_format
 from polyins.io.rows import ImuRows, intervals, without
@@ -33,6 +34,9 @@ def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuS
         find(entry.file)
     rows, saturated = _within_range(_rows(entry, document.place(["imus", index])), entry)
     warnings = (*_checked(rows, entry), *saturated)
+    rows, faults = without_faults(rows, entry.name, entry.clock_offset_s)
+    range_known = (entry.gyro_range_deg_s or rows.gyro_range_deg_s) is not None
+    warnings += (*faults, *clipped(rows, entry.name, entry.clock_offset_s, gyro=not range_known))
     rotation = sensor_rotation(entry)
     time = rows.time + entry.clock_offset_s
     stream = ImuStream(entry.name, time, _turned(rotation, rows.dtheta), _turned(rotation, rows.dvel))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from polyins.config import Config, ImuEntry, WheelEntry
 from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
+from polyins.io.drive_checks import check_drive
 from polyins.io.rows import intervals
 from polyins.io.steering import yaw_differences
 from polyins.io.yaml_document import Document, Key
@@ -162,6 +163,7 @@ def check_motion(
     warnings += [*_check_ways(rolling, document), *unlike]
     if not unlike:
         warnings += _check_steering(rolling, imus, streams, document)
+        warnings += check_drive(document, imus, streams, gnss, geodetic)
     if gnss is not None:
         warnings += [text for wheel in rolling for text in _check_radius(wheel, gnss, geodetic, document)]
     return warnings

@@ -5,7 +5,13 @@ Each name is the offset of the first of eight lanes; vectors and matrices take c
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy.typing as npt
+
 from polyins.kernels.layout import Layout
+
+Array = npt.NDArray[Any]
 
 LANES = 8
 
@@ -62,3 +68,8 @@ RESIDUAL = _take(3)  # of the last measurement
 CORRECTION = _take(24)  # error state of the last update
 
 SIZE = _layout.size
+
+
+def put(w: Array, field: int, lane: int, values: Array) -> None:
+    """Write the field of one IMU, a number or more."""
+    w[field + lane : field + lane + len(values) * LANES : LANES] = values

@@ -1,4 +1,4 @@
-"""The attitude of a vehicle as the IMUs on its wheels and body see it, and the middle of its rear axle.
+"""The attitude of a vehicle as it follows from the IMUs on its wheels and body, and the middle of its rear axle.
 
 v is forward-right-down. An IMU on a wheel has its x axis along the axle, to the right; what else it knows of the
 vehicle's attitude is nothing, so roll and pitch are lent by an IMU on the body, or zero.
@@ -13,7 +13,27 @@ from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, kernel
 
 Three = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@kernel
+def turned_about_down(c: Matrix, x: float, y: float, n: float, e: float) -> Matrix:
+    """Turn C_nv about the vertical until its vector with the horizontal parts (x, y) points along (n, e)."""
+    scale = 1.0 / math.sqrt((n * n + e * e) * (x * x + y * y))
+    cos = (n * x + e * y) * scale
+    sin = (e * x - n * y) * scale
+    return (
+        cos * c[0] - sin * c[3],
+        cos * c[1] - sin * c[4],
+        cos * c[2] - sin * c[5],
+        sin * c[0] + cos * c[3],
+        sin * c[1] + cos * c[4],
+        sin * c[2] + cos * c[5],
+        c[6],
+        c[7],
+        c[8],
+    )
 
 
 @kernel
@@ -22,20 +42,7 @@ def turned_to_axle(lent: Matrix, n: float, e: float) -> Matrix:
 
     Exact for a tilted axle, whose heading is not that of the vehicle plus 90 degrees.
     """
-    scale = 1.0 / math.sqrt((n * n + e * e) * (lent[1] * lent[1] + lent[4] * lent[4]))
-    c = (n * lent[1] + e * lent[4]) * scale
-    s = (e * lent[1] - n * lent[4]) * scale
-    return (
-        c * lent[0] - s * lent[3],
-        c * lent[1] - s * lent[4],
-        c * lent[2] - s * lent[5],
-        s * lent[0] + c * lent[3],
-        s * lent[1] + c * lent[4],
-        s * lent[2] + c * lent[5],
-        lent[6],
-        lent[7],
-        lent[8],
-    )
+    return turned_about_down(lent, lent[1], lent[4], n, e)
 
 
 @kernel
@@ -107,8 +114,8 @@ def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> T
 
 
 @kernel
-def seen_by_lane(w: Array, lane: int, lent: Matrix) -> Matrix:
-    """C_nv as one IMU sees it."""
+def vehicle_matrix(w: Array, lane: int, lent: Matrix) -> Matrix:
+    """C_nv as it follows from the attitude of one IMU."""
     c = lane_matrix(w, bank.MATRIX + lane)
     if w[bank.WHEEL + lane] != 0.0:
         return turned_to_axle(lent, c[0], c[3])
@@ -124,8 +131,8 @@ def lent_matrix(groups: Array, lender: int) -> Matrix:
 
 
 @kernel
-def see(blocks: Array, groups: Array, members: Array, lenders: Array) -> None:
-    """Write C_nv as the fused attitude of each share sees it; the shares that lend come first in time, not in place."""
+def update_attitudes(blocks: Array, groups: Array, members: Array, lenders: Array) -> None:
+    """Write C_nv of each share from its fused attitude; the shares that lend come first in time, not in place."""
     for lending in (True, False):
         for s in range(members.shape[0]):
             w, lane = blocks[members[s, 0] // LANES], members[s, 0] % LANES
@@ -170,12 +177,12 @@ def merge(blocks: Array, groups: Array, members: Array, lenders: Array, silent: 
     Position and velocity are the means over the shares that are not silent, the heading is their mean direction; roll
     and pitch are those lent. Paper B (7)-(8), with all IMUs in one frame.
     """
-    see(blocks, groups, members, lenders)
-    speaking = 0
+    update_attitudes(blocks, groups, members, lenders)
+    measuring = 0
     for s in range(members.shape[0]):
         if silent[s] < 0.0:
-            speaking += 1
-    if speaking == 0:
+            measuring += 1
+    if measuring == 0:
         return
     merged = groups[-1]
     for k in range(6):
@@ -217,46 +224,17 @@ def merge(blocks: Array, groups: Array, members: Array, lenders: Array, silent: 
         forward_n += v[0] * norm
         forward_e += v[3] * norm
     for k in range(3):
-        merged[share.POSITION + k] = groups[base, share.POSITION + k] + merged[share.POSITION + k] / speaking
-        merged[share.VELOCITY + k] /= speaking
-    _attitude(groups, lent_matrix(groups, lender), forward_n, forward_e)
-
-
-@kernel
-def _attitude(groups: Array, lent: Matrix, forward_n: float, forward_e: float) -> None:
-    """Write the matrix and the quaternion of the lent attitude turned to the mean heading."""
-    merged = groups[-1]
-    scale = 1.0 / math.sqrt((forward_n * forward_n + forward_e * forward_e) * (lent[0] * lent[0] + lent[3] * lent[3]))
-    c = (forward_n * lent[0] + forward_e * lent[3]) * scale
-    s = (forward_e * lent[0] - forward_n * lent[3]) * scale
-    v = (
-        c * lent[0] - s * lent[3],
-        c * lent[1] - s * lent[4],
-        c * lent[2] - s * lent[5],
-        s * lent[0] + c * lent[3],
-        s * lent[1] + c * lent[4],
-        s * lent[2] + c * lent[5],
-        lent[6],
-        lent[7],
-        lent[8],
-    )
+        merged[share.POSITION + k] = groups[base, share.POSITION + k] + merged[share.POSITION + k] / measuring
+        merged[share.VELOCITY + k] /= measuring
+    lent = lent_matrix(groups, lender)
+    v = turned_about_down(lent, lent[0], lent[3], forward_n, forward_e)
     put_matrix(merged, share.MATRIX, v)
     put_matrix(merged, share.VEHICLE, v)
-    _quaternion(merged, v)
-
-
-@kernel
-def _quaternion(g: Array, v: Matrix) -> None:
-    """Write the quaternion of a vehicle that is not overturned: its scalar or its vertical part is the largest."""
-    if v[0] + v[4] + v[8] > 0.0:
-        q0 = 0.5 * math.sqrt(1.0 + v[0] + v[4] + v[8])
-        f = 0.25 / q0
-        q1, q2, q3 = (v[7] - v[5]) * f, (v[2] - v[6]) * f, (v[3] - v[1]) * f
-    else:
-        q3 = 0.5 * math.sqrt(max(1e-12, 1.0 + v[8] - v[0] - v[4]))
-        f = 0.25 / q3
-        q0, q1, q2 = (v[3] - v[1]) * f, (v[2] + v[6]) * f, (v[7] + v[5]) * f
-    g[share.QUATERNION], g[share.QUATERNION + 1], g[share.QUATERNION + 2], g[share.QUATERNION + 3] = q0, q1, q2, q3
+    # of the two quaternions the one whose scalar part, or near the half turn the vertical one, is positive
+    reference = (1.0, 0.0, 0.0, 0.0) if v[0] + v[4] + v[8] > 0.0 else (0.0, 0.0, 0.0, 1.0)
+    q = quaternion(v, reference)
+    for k in range(4):
+        merged[share.QUATERNION + k] = q[k]
 
 
 @kernel
@@ -284,10 +262,8 @@ def wheel_turned(w: Array, lane: int, v: Matrix, angle: float) -> Matrix:
 
 
 @kernel
-def put_attitude(w: Array, lane: int, c: Matrix) -> None:
-    """Give an IMU an attitude: matrix and quaternion, on the side of the hypersphere where it was."""
-    for k in range(9):
-        w[bank.MATRIX + k * LANES + lane] = c[k]
+def quaternion(c: Matrix, near: Quaternion) -> Quaternion:
+    """Return the quaternion of a rotation that lies on the side of the hypersphere where `near` is."""
     trace = c[0] + c[4] + c[8]
     a, b, d, e = trace, 2.0 * c[0] - trace, 2.0 * c[4] - trace, 2.0 * c[8] - trace
     largest = max(max(a, b), max(d, e))
@@ -301,9 +277,18 @@ def put_attitude(w: Array, lane: int, c: Matrix) -> None:
         q = ((c[2] - c[6]) * f, (c[1] + c[3]) * f, own, (c[5] + c[7]) * f)
     else:
         q = ((c[3] - c[1]) * f, (c[2] + c[6]) * f, (c[5] + c[7]) * f, own)
-    same = 0.0
+    same = q[0] * near[0] + q[1] * near[1] + q[2] * near[2] + q[3] * near[3]
+    if same < 0.0:
+        return -q[0], -q[1], -q[2], -q[3]
+    return q
+
+
+@kernel
+def put_attitude(w: Array, lane: int, c: Matrix) -> None:
+    """Give an IMU an attitude: matrix and quaternion, on the side of the hypersphere where it was."""
+    for k in range(9):
+        w[bank.MATRIX + k * LANES + lane] = c[k]
+    f = bank.QUATERNION + lane
+    q = quaternion(c, (w[f], w[f + LANES], w[f + 2 * LANES], w[f + 3 * LANES]))
     for k in range(4):
-        same += q[k] * w[bank.QUATERNION + k * LANES + lane]
-    sign = -1.0 if same < 0.0 else 1.0
-    for k in range(4):
-        w[bank.QUATERNION + k * LANES + lane] = sign * q[k]
+        w[f + k * LANES] = q[k]

@@ -21,6 +21,8 @@ TARGETS = (
 """Each is a module of this package with a function `reproduce(quick, progress)`."""
 WITH_REPORTS = ("wid", "a3", "a5", "afig3", "bfig7", "bfig8", "bfig9", "bfig10")
 """Those whose function also takes `out`, the folder for reports."""
+WITH_TABLES = ("wid",)
+"""Those with a function `print_tables`."""
 
 
 def find_target(name: str, out: Path) -> Callable[[bool, Callable[[float], None]], Document]:
@@ -37,7 +39,13 @@ def find_target(name: str, out: Path) -> Callable[[bool, Callable[[float], None]
 
 
 def print_document(document: Document) -> None:
-    """Print every figure of a document, one per row, named by its path, with the paper's beside it; then its words."""
+    """Print every figure of a document, one per row, named by its path, with the paper's beside it; then its words.
+
+    Those with tables of their own print these instead.
+    """
+    if document["target"] in WITH_TABLES:
+        importlib.import_module(f"polyins.reproduce.{document['target']}").print_tables(document["polyins"])
+        return
     published = dict(_leaves(document["paper"]))
     figures = dict(_leaves(document["polyins"]))
     rows = [[path, published.get(path, "-"), figures.get(path, "-")] for path in dict.fromkeys([*figures, *published])]

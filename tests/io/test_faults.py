@@ -1,0 +1,133 @@
+"""Rows that a chip did not measure are left out and named; whatever is constant for a reason stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.io.faults import LONGEST_REPEAT, check_alive, clipped, without_faults
+from polyins.io.rows import ImuRows, Source
+from polyins.recording import ImuStream
+
+RATE_HZ = 100.0
+Array = NDArray[np.float64]
+
+
+def noisy(seed: int = 1, count: int = 1000, noise: float = 1e-3) -> ImuRows:
+    """An IMU at rest, in increments."""
+    values = np.random.default_rng(seed).normal([0.0, 0.0, 0.0, 0.0, 0.0, -9.8], noise, (count, 6)) / RATE_HZ
+    return rows(values)
+
+
+def rows(values: Array) -> ImuRows:
+    return ImuRows(Source("a.csv", 2), 100.0 + np.arange(len(values)) / RATE_HZ, values[:, :3], values[:, 3:])
+
+
+def held(of: ImuRows, begin: int, end: int) -> ImuRows:
+    """The rows with those from begin to end - 1 all equal to the one before."""
+    dtheta, dvel = of.dtheta.copy(), of.dvel.copy()
+    dtheta[begin:end], dvel[begin:end] = dtheta[begin - 1], dvel[begin - 1]
+    return replace(of, dtheta=dtheta, dvel=dvel)
+
+
+@settings(max_examples=25, deadline=None)
+@given(begin=st.integers(1, 500), length=st.integers(LONGEST_REPEAT, 400))
+def test_a_frozen_chip_is_left_out_exactly_while_it_is_frozen(begin: int, length: int) -> None:
+    given_rows = noisy()
+    kept, (text,) = without_faults(held(given_rows, begin, begin + length), "left", 7.0)
+    np.testing.assert_array_equal(kept.time, np.delete(given_rows.time, slice(begin, begin + length)))
+    first, last = given_rows.time[begin - 1] + 7.0, given_rows.time[begin + length - 1] + 7.0
+    assert text == f"a.csv: IMU left repeats the same values from {first:.3f} to {last:.3f} s; left out"
+
+
+def test_a_chip_that_freezes_again_and_again_is_named_each_time() -> None:
+    kept, texts = without_faults(held(held(noisy(), 100, 130), 400, 450), "left", 0.0)
+    assert len(kept.time) == 1000 - 30 - 50
+    assert [text.split(" from ")[1].split(" ")[0] for text in texts] == ["100.990", "103.990"]
+
+
+def test_a_few_equal_samples_are_no_fault() -> None:
+    given_rows = held(noisy(), 100, 100 + LONGEST_REPEAT - 1)
+    assert without_faults(given_rows, "left", 0.0) == (given_rows, ())
+
+
+@pytest.mark.parametrize("length", [1, 2, 50])
+def test_rows_of_zeros_are_left_out(length: int) -> None:
+    given_rows = noisy()
+    given_rows.dtheta[200 : 200 + length] = 0.0
+    given_rows.dvel[200 : 200 + length] = 0.0
+    kept, texts = without_faults(given_rows, "left", 0.0)
+    assert len(kept.time) == 1000 - length
+    assert "IMU left shows zeros only from 101.990" in texts[0]
+
+
+def test_a_gyro_at_exactly_zero_is_no_fault() -> None:
+    given_rows = replace(noisy(), dtheta=np.zeros((1000, 3)))
+    assert without_faults(given_rows, "left", 0.0) == (given_rows, ())
+
+
+def test_data_without_noise_may_be_constant() -> None:
+    """An IMU on a body that drives straight on, turns, and drives straight on again."""
+    time = np.arange(3000) / RATE_HZ
+    turn = np.where((time > 10.0) & (time < 20.0), np.sin(0.1 * np.pi * time) ** 2, 0.0)
+    values = (
+        np.column_stack([0.0 * turn, 0.0 * turn, 0.5 * turn, 0.0 * turn, 3.0 * turn, np.full(3000, -9.8)]) / RATE_HZ
+    )
+    assert without_faults(rows(values), "body", 0.0)[1] == ()
+    assert without_faults(rows(values + 1e-17 * noisy(count=3000, noise=1.0).dvel[:, :1]), "body", 0.0)[1] == ()
+    assert without_faults(rows(np.tile(values[0], (3000, 1))), "body", 0.0)[1] == ()
+    assert clipped(rows(values), "body", 0.0) == ()
+
+
+def test_samples_written_several_times_are_no_freezing() -> None:
+    """A chip of 5 Hz in a file of 100."""
+    slow = noisy(count=50)
+    values = np.repeat(np.hstack([slow.dtheta, slow.dvel]), 20, axis=0)
+    assert without_faults(rows(values), "left", 0.0)[1] == ()
+    values[500:] = values[500]
+    assert len(without_faults(rows(values), "left", 0.0)[0].time) == 501
+
+
+def test_rates_at_uneven_stamps_are_compared_as_rates() -> None:
+    generator = np.random.default_rng(3)
+    given_rows = noisy()
+    stamps = np.cumsum(generator.uniform(0.008, 0.012, 1000))
+    per_second = np.hstack([given_rows.dtheta, given_rows.dvel]) * RATE_HZ
+    per_second[300:400] = per_second[299]
+    steps = np.diff(stamps, prepend=0.0)[:, None]
+    kept, _ = without_faults(ImuRows(Source("a.csv"), stamps, *np.hsplit(per_second * steps, 2)), "left", 0.0)
+    assert len(kept.time) == 900
+
+
+def test_one_dead_chip_among_others_is_refused_and_a_constant_recording_is_not() -> None:
+    alive, dead = (
+        ImuStream(name, one.time, one.dtheta, one.dvel) for name, one in (("a", noisy()), ("b", held(noisy(), 1, 1000)))
+    )
+    with pytest.raises(InputError, match="IMU b: shows the same values throughout"):
+        check_alive((alive, dead))
+    check_alive((dead, dead))
+    check_alive((alive, alive))
+
+
+@pytest.mark.parametrize(("channel", "unit", "name"), [(1, np.pi / 180.0, "gyro y"), (3, 1.0, "accelerometer x")])
+def test_values_that_stay_at_the_largest_one_are_a_warning(channel: int, unit: float, name: str) -> None:
+    values = noisy(noise=0.2).dtheta[:, 0] * RATE_HZ + 300.0 * np.sin(np.arange(1000) / 30.0)
+    whole = np.hstack([noisy().dtheta, noisy().dvel])
+    whole[:, channel] = unit * values / RATE_HZ
+    assert clipped(rows(whole), "left", 0.0) == ()
+    whole[:, channel] = unit * np.clip(values, -250.0, 250.0) / RATE_HZ
+    (text,) = clipped(rows(whole), "left", 0.0)
+    assert f"{name} of IMU left stays at exactly 250" in text
+    assert clipped(rows(whole), "left", 0.0, gyro=False) == (() if channel < 3 else (text,))
+
+
+def test_a_coarse_gyro_at_rest_is_not_clipped() -> None:
+    whole = np.hstack([noisy().dtheta, noisy().dvel])
+    whole[:, 0] = np.round(noisy(4).dtheta[:, 0] / 3e-5) * 3e-5
+    assert clipped(rows(whole), "left", 0.0) == ()
