@@ -121,11 +121,14 @@ def propagate(
     ratio = dt * dt / (6.0 * clock[1] * (clock[1] + dt))
     for b in range(blocks.shape[0]):
         w = blocks[b]
+        if rolling is not None and rolling.present.shape[0] > 0:
+            strapdown.remember_matrix(w)
         strapdown.compensate(w, fraction, dt)
         if shared_mechanization:
-            fuse.evaluate_at_fused_state(w, groups[0])
+            fuse.mechanize_at_fused_state(w, groups[0], dt, ratio, near)
         else:
-            strapdown.evaluate_at_own_state(w)
+            strapdown.mechanize(w, dt, ratio, near)
+        strapdown.remember(w)
     for s in range(members.shape[0]):
         g = groups[s]
         fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
@@ -140,10 +143,6 @@ def propagate(
         for s in range(members.shape[0]):
             for other in range(s + 1, members.shape[0]):
                 joint.predict(groups, s, other, dt, joined.whole, joined.work)
-    for b in range(blocks.shape[0]):
-        w = blocks[b]
-        strapdown.mechanize(w, dt, ratio, near)
-        strapdown.remember(w)
     clock[0] += dt
     clock[1] = dt
     if origin is not None:
@@ -299,7 +298,8 @@ def _record(state: State, nis: float, innovation: Array, rolling: Rolling | None
             for a in range(3):
                 innovation[a] += state.measurements[s, kalman.RESIDUAL + a]
                 innovation[3 + a] += state.measurements[s, kalman.S + 4 * a]
-    innovation[:6] /= max(measured, 1)
+    for a in range(6):
+        innovation[a] /= max(measured, 1)
     innovation[6] = nis
 
 

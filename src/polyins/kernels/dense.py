@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from polyins.kernels import share
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, blas_kernel, kernel
 from polyins.kernels.share import HALF, INERTIAL, NAV, STATES, STRIDE, P
 
 NOISES = 18
@@ -48,7 +48,7 @@ def _fill_noise(g: Array, dt: float, shaping: Array, o: int, n: int) -> None:
         shaping[1, o + NAV + k, n + 6 + k] = g[share.ERROR_PSD + k] * dt
 
 
-@kernel
+@blas_kernel
 def _advance(squares: Array, shaping: Array) -> None:
     """Qd = (Phi Q Phi' + Q) / 2 with Q = G Qc G' dt, then Phi P Phi' + Qd in RESULT: five products."""
     phi, p, q = squares[PHI], squares[COVARIANCE], squares[NOISE]

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 
-from polyins.kernels import bank, share
+from polyins.kernels import bank, share, strapdown
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, formula, kernel
 
-# field of the bank, place in the share, how many
-MEASUREMENTS = ((bank.DTHETA, share.RATE, 3), (bank.DVEL, share.FORCE, 3))
-STATES = (
-    (bank.ORIGIN_POSITION, share.POSITION, 3),
-    (bank.ORIGIN_VELOCITY, share.VELOCITY, 3),
-    (bank.QUATERNION, share.QUATERNION, 4),
-)
+Three = tuple[float, float, float]
+Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 
 @kernel
@@ -23,11 +18,12 @@ def project_to_origin(w: Array, dt: float) -> None:
 
     The angular rate is the mean over the last `dt` seconds; relative to the earth it is w_ib less earth rate.
     """
+    per_second = 1.0 / dt
     for i in range(LANES):
         lx, ly, lz = w[bank.TO_ORIGIN + i], w[bank.TO_ORIGIN + LANES + i], w[bank.TO_ORIGIN + 2 * LANES + i]
-        ax = w[bank.DTHETA + i] / dt
-        ay = w[bank.DTHETA + LANES + i] / dt
-        az = w[bank.DTHETA + 2 * LANES + i] / dt
+        ax = w[bank.DTHETA + i] * per_second
+        ay = w[bank.DTHETA + LANES + i] * per_second
+        az = w[bank.DTHETA + 2 * LANES + i] * per_second
         m = bank.MATRIX + i
         ln = w[m] * lx + w[m + LANES] * ly + w[m + 2 * LANES] * lz
         le = w[m + 3 * LANES] * lx + w[m + 4 * LANES] * ly + w[m + 5 * LANES] * lz
@@ -43,38 +39,77 @@ def project_to_origin(w: Array, dt: float) -> None:
         w[bank.ORIGIN_VELOCITY + 2 * LANES + i] = w[bank.VELOCITY + 2 * LANES + i] + (rn * le - re * ln)
 
 
-@kernel
-def _mean(blocks: Array, first: int, last: int, field: int, g: Array, to: int, count: int) -> None:
-    """Write the weighted means of `count` fields over lanes first ... last - 1, as offsets from the first lane's.
+@formula
+def _write_offset(w: Array, i: int, field: int, base: Three, n: int) -> None:
+    """Write how far a vector of one lane is from the base, weighted, as the n-th number and those after it."""
+    weight = w[bank.WEIGHT + i]
+    w[bank.OFFSET + n * LANES + i] = weight * (w[field + i] - base[0])
+    w[bank.OFFSET + (n + 1) * LANES + i] = weight * (w[field + LANES + i] - base[1])
+    w[bank.OFFSET + (n + 2) * LANES + i] = weight * (w[field + 2 * LANES + i] - base[2])
 
-    Members of a share begin with a block and have their blocks to themselves: lanes left over have weight 0.
-    """
-    for n in range(count * LANES):
+
+@kernel
+def _add_measurements(w: Array, g: Array) -> None:
+    rate, force = _three(g, share.RATE), _three(g, share.FORCE)
+    for i in range(LANES):
+        _write_offset(w, i, bank.DTHETA, rate, 0)
+        _write_offset(w, i, bank.DVEL, force, 3)
+    # apart from the loop over lanes, which with another array in it would not vectorize
+    for n in range(6 * LANES):
+        g[share.LANE_SUMS + n] += w[bank.OFFSET + n]
+
+
+@kernel
+def _add_states(w: Array, g: Array) -> None:
+    r, v = _three(g, share.POSITION), _three(g, share.VELOCITY)
+    q, last = _three(g, share.QUATERNION), g[share.QUATERNION + 3]
+    for i in range(LANES):
+        _write_offset(w, i, bank.ORIGIN_POSITION, r, 0)
+        _write_offset(w, i, bank.ORIGIN_VELOCITY, v, 3)
+        _write_offset(w, i, bank.QUATERNION, q, 6)
+        w[bank.OFFSET + 9 * LANES + i] = w[bank.WEIGHT + i] * (w[bank.QUATERNION + 3 * LANES + i] - last)
+    for n in range(10 * LANES):
+        g[share.LANE_SUMS + n] += w[bank.OFFSET + n]
+
+
+@kernel
+def _clear_sums(g: Array) -> None:
+    for n in range(10 * LANES):
         g[share.LANE_SUMS + n] = 0.0
-    for b in range(first // LANES, (last + LANES - 1) // LANES):
-        w = blocks[b]
-        for f in range(count):
-            base = blocks[first // LANES, field + f * LANES]
-            for i in range(LANES):
-                g[share.LANE_SUMS + f * LANES + i] += w[bank.WEIGHT + i] * (w[field + f * LANES + i] - base)
+
+
+@kernel
+def _finish_means(g: Array, n: int, to: int, count: int) -> None:
+    """Add the means of the offsets, whose sums begin at the n-th."""
+    scale = 1.0 / g[share.WEIGHTS]
     for f in range(count):
         total = 0.0
         for i in range(LANES):
-            total += g[share.LANE_SUMS + f * LANES + i]
-        g[to + f] = blocks[first // LANES, field + f * LANES] + total / g[share.WEIGHTS]
+            total += g[share.LANE_SUMS + (n + f) * LANES + i]
+        g[to + f] += total * scale
+
+
+@kernel
+def _three(g: Array, x: int) -> Three:
+    return g[x], g[x + 1], g[x + 2]
 
 
 @kernel
 def fuse_measurements(blocks: Array, first: int, last: int, g: Array, dt: float) -> None:
-    """Write the mean rate and specific force of the members, paper A (14); axes are parallel by convention."""
-    if last - first == 1:
-        w, lane = blocks[first // LANES], first % LANES
-        for k in range(3):
-            g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane]
-            g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane]
-    else:
-        for field, to, count in MEASUREMENTS:
-            _mean(blocks, first, last, field, g, to, count)
+    """Write the mean rate and specific force of the members, paper A (14); axes are parallel by convention.
+
+    Members of a share begin with a block and have their blocks to themselves: lanes left over have weight 0.
+    """
+    w, lane = blocks[first // LANES], first % LANES
+    for k in range(3):
+        g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane]
+        g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane]
+    if last - first > 1:
+        _clear_sums(g)
+        for b in range(first // LANES, (last + LANES - 1) // LANES):
+            _add_measurements(blocks[b], g)
+        _finish_means(g, 0, share.RATE, 3)
+        _finish_means(g, 3, share.FORCE, 3)
     per_second = 1.0 / dt
     for k in range(3):
         g[share.RATE + k] *= per_second
@@ -88,22 +123,34 @@ def fuse_states(blocks: Array, first: int, last: int, g: Array) -> None:
     Attitudes are averaged as quaternions, which all members keep on one side of the hypersphere: the normalized sum
     is the rotation mean up to the third power of the spread, at any heading and pitch (paper A averages Euler angles).
     """
-    if last - first == 1:
-        block, lane = first // LANES, first % LANES
-        for k in range(3):
-            g[share.POSITION + k] = blocks[block, bank.POSITION + k * LANES + lane]
-            g[share.VELOCITY + k] = blocks[block, bank.VELOCITY + k * LANES + lane]
-        for k in range(4):
-            g[share.QUATERNION + k] = blocks[block, bank.QUATERNION + k * LANES + lane]
-    else:
-        for field, to, count in STATES:
-            _mean(blocks, first, last, field, g, to, count)
-        norm = 0.0
-        for k in range(4):
-            norm += g[share.QUATERNION + k] * g[share.QUATERNION + k]
-        for k in range(4):
-            g[share.QUATERNION + k] /= math.sqrt(norm)
+    w, lane = blocks[first // LANES], first % LANES
+    for k in range(4):
+        g[share.QUATERNION + k] = w[bank.QUATERNION + k * LANES + lane]
+    several = last - first > 1
+    position = bank.ORIGIN_POSITION if several else bank.POSITION
+    velocity = bank.ORIGIN_VELOCITY if several else bank.VELOCITY
+    for k in range(3):
+        g[share.POSITION + k] = w[position + k * LANES + lane]
+        g[share.VELOCITY + k] = w[velocity + k * LANES + lane]
+    if several:
+        _clear_sums(g)
+        for b in range(first // LANES, (last + LANES - 1) // LANES):
+            _add_states(blocks[b], g)
+        _finish_means(g, 0, share.POSITION, 3)
+        _finish_means(g, 3, share.VELOCITY, 3)
+        _finish_means(g, 6, share.QUATERNION, 4)
+        _normalize(g)
     quaternion_to_matrix(g, share.QUATERNION, share.MATRIX)
+
+
+@kernel
+def _normalize(g: Array) -> None:
+    norm = 0.0
+    for k in range(4):
+        norm += g[share.QUATERNION + k] * g[share.QUATERNION + k]
+    scale = 1.0 / math.sqrt(norm)
+    for k in range(4):
+        g[share.QUATERNION + k] *= scale
 
 
 @kernel
@@ -133,29 +180,57 @@ def quaternion_to_matrix(g: Array, q: int, c: int) -> None:
 
 @kernel
 def evaluate_at_fused_state(w: Array, g: Array) -> None:
-    """Let the fused state be where the earth is evaluated and what rotates each velocity increment.
-
-    Its velocity is projected to each IMU's point. Simplification ii of paper A, Table VI.
-    """
+    """Let the fused state be where the earth is evaluated; its velocity is projected to each IMU's point."""
+    r0, r1, r2 = g[share.POSITION], g[share.POSITION + 1], g[share.POSITION + 2]
+    vn, ve, vd = g[share.VELOCITY], g[share.VELOCITY + 1], g[share.VELOCITY + 2]
+    c = _matrix(g)
+    n, e, d = _rotated(c, g[share.RATE], g[share.RATE + 1], g[share.RATE + 2])
     for i in range(LANES):
         lx, ly, lz = w[bank.TO_ORIGIN + i], w[bank.TO_ORIGIN + LANES + i], w[bank.TO_ORIGIN + 2 * LANES + i]
-        c = share.MATRIX
-        x, y, z = g[share.RATE], g[share.RATE + 1], g[share.RATE + 2]
-        ln = g[c] * lx + g[c + 1] * ly + g[c + 2] * lz
-        le = g[c + 3] * lx + g[c + 4] * ly + g[c + 5] * lz
-        ld = g[c + 6] * lx + g[c + 7] * ly + g[c + 8] * lz
-        rn = g[c] * x + g[c + 1] * y + g[c + 2] * z - w[bank.EARTH_RATE + i]
-        re = g[c + 3] * x + g[c + 4] * y + g[c + 5] * z
-        rd = g[c + 6] * x + g[c + 7] * y + g[c + 8] * z - w[bank.EARTH_RATE + LANES + i]
-        w[bank.AT_VELOCITY + i] = g[share.VELOCITY] - (re * ld - rd * le)
-        w[bank.AT_VELOCITY + LANES + i] = g[share.VELOCITY + 1] - (rd * ln - rn * ld)
-        w[bank.AT_VELOCITY + 2 * LANES + i] = g[share.VELOCITY + 2] - (rn * le - re * ln)
-    for k in range(3):
-        for i in range(LANES):
-            w[bank.AT_POSITION + k * LANES + i] = g[share.POSITION + k]
-    for k in range(9):
-        for i in range(LANES):
-            w[bank.AT_MATRIX + k * LANES + i] = g[share.MATRIX + k]
+        ln, le, ld = _rotated(c, lx, ly, lz)
+        rn = n - w[bank.EARTH_RATE + i]
+        rd = d - w[bank.EARTH_RATE + LANES + i]
+        w[bank.AT_VELOCITY + i] = vn - (e * ld - rd * le)
+        w[bank.AT_VELOCITY + LANES + i] = ve - (rd * ln - rn * ld)
+        w[bank.AT_VELOCITY + 2 * LANES + i] = vd - (rn * le - e * ln)
+        w[bank.AT_POSITION + i] = r0
+        w[bank.AT_POSITION + LANES + i] = r1
+        w[bank.AT_POSITION + 2 * LANES + i] = r2
+
+
+@kernel
+def rotate_to_n(w: Array, g: Array) -> None:
+    """Rotate the velocity increments into n with the fused attitude at the start of the interval (over DVEL_N)."""
+    c = _matrix(g)
+    for i in range(LANES):
+        x, y, z = w[bank.DVEL_N + i], w[bank.DVEL_N + LANES + i], w[bank.DVEL_N + 2 * LANES + i]
+        n, e, d = _rotated(c, x, y, z)
+        w[bank.DVEL_N + i] = n
+        w[bank.DVEL_N + LANES + i] = e
+        w[bank.DVEL_N + 2 * LANES + i] = d
+
+
+@kernel
+def mechanize_at_fused_state(w: Array, g: Array, dt: float, ratio: float, near: Array) -> None:
+    """Advance the eight IMUs of a block by `dt` seconds, all from the fused state: simplification ii of paper A, VI.
+
+    RATE is that of the last interval, with which the velocity came from the IMU to the origin.
+    """
+    strapdown.correct_coning_and_sculling(w, ratio)
+    rotate_to_n(w, g)
+    evaluate_at_fused_state(w, g)
+    strapdown.advance(w, dt, near)
+
+
+@kernel
+def _matrix(g: Array) -> Nine:
+    c = share.MATRIX
+    return g[c], g[c + 1], g[c + 2], g[c + 3], g[c + 4], g[c + 5], g[c + 6], g[c + 7], g[c + 8]
+
+
+@formula
+def _rotated(c: Nine, x: float, y: float, z: float) -> Three:
+    return c[0] * x + c[1] * y + c[2] * z, c[3] * x + c[4] * y + c[5] * z, c[6] * x + c[7] * y + c[8] * z
 
 
 @kernel
