@@ -119,6 +119,7 @@ def propagate(
     if near[0] != 0.0 and abs(groups[-1, share.POSITION] - near[1]) > 5e-4:
         move_near(near, groups[-1, share.POSITION])
     ratio = dt * dt / (6.0 * clock[1] * (clock[1] + dt))
+    several = members[members.shape[0] - 1, 1] > 1
     for b in range(blocks.shape[0]):
         w = blocks[b]
         if rolling is not None and rolling.present.shape[0] > 0:
@@ -129,9 +130,17 @@ def propagate(
         else:
             strapdown.mechanize(w, dt, ratio, near)
         strapdown.remember(w)
+        if origin is not None and several:
+            fuse.project_to_origin(w, dt)
+            if b == 0:
+                fuse.begin_means(w, groups[-1])
+            fuse.add_to_means(w, groups[-1])
     for s in range(members.shape[0]):
         g = groups[s]
-        fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
+        if origin is not None and members[s, 1] - members[s, 0] > 1:
+            fuse.finish_measurements(g, dt)
+        else:
+            fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
         share.error_model(g, dt, near)
         if work is None:
             share.predict(g, dt)
@@ -146,7 +155,7 @@ def propagate(
     clock[0] += dt
     clock[1] = dt
     if origin is not None:
-        merge(blocks, groups, members, dt)
+        _finish_merging(blocks, groups, members)
     if rolling is not None:
         fuse.fuse_shares(blocks, groups, members, dt)
         vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
@@ -162,15 +171,24 @@ def move_near(near: Array, latitude: float) -> None:
 
 @kernel
 def merge(blocks: Array, groups: Array, members: Array, dt: float) -> None:
-    """Fuse the members of each share, and all IMUs into the last row of the groups."""
-    shares = members.shape[0]
-    if members[shares - 1, 1] > 1:
+    """Fuse the members of each share, and all IMUs of an array into the last row of the groups."""
+    if members[members.shape[0] - 1, 1] > 1:
         for b in range(blocks.shape[0]):
             fuse.project_to_origin(blocks[b], dt)
-    for s in range(shares):
-        fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
-    if shares > 1:
-        fuse.fuse_states(blocks, 0, members[shares - 1, 1], groups[shares])
+            if b == 0:
+                fuse.begin_means(blocks[b], groups[-1])
+            fuse.add_to_means(blocks[b], groups[-1])
+    _finish_merging(blocks, groups, members)
+
+
+@kernel
+def _finish_merging(blocks: Array, groups: Array, members: Array) -> None:
+    """An array has one share for all, or one for each IMU and the mean of all after them."""
+    if members[0, 1] - members[0, 0] == 1:
+        for s in range(members.shape[0]):
+            fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
+    if members[members.shape[0] - 1, 1] > 1:
+        fuse.finish_states(groups[-1])
 
 
 @kernel

@@ -39,6 +39,25 @@ def project_to_origin(w: Array, dt: float) -> None:
         w[bank.ORIGIN_VELOCITY + 2 * LANES + i] = w[bank.VELOCITY + 2 * LANES + i] + (rn * le - re * ln)
 
 
+@kernel
+def begin_means(w: Array, g: Array) -> None:
+    """Begin means over blocks of which this is the first: its first IMU is what offsets are taken from."""
+    for k in range(3):
+        g[share.BASES + k] = w[bank.ORIGIN_POSITION + k * LANES]
+        g[share.BASES + 3 + k] = w[bank.ORIGIN_VELOCITY + k * LANES]
+        g[share.BASES + 10 + k] = w[bank.DTHETA + k * LANES]
+        g[share.BASES + 13 + k] = w[bank.DVEL + k * LANES]
+    for k in range(4):
+        g[share.BASES + 6 + k] = w[bank.QUATERNION + k * LANES]
+    for n in range(16 * LANES):
+        g[share.LANE_SUMS + n] = 0.0
+
+
+@kernel
+def _three(g: Array, x: int) -> Three:
+    return g[x], g[x + 1], g[x + 2]
+
+
 @formula
 def _write_offset(w: Array, i: int, field: int, base: Three, n: int) -> None:
     """Write how far a vector of one lane is from the base, weighted, as the n-th number and those after it."""
@@ -49,98 +68,92 @@ def _write_offset(w: Array, i: int, field: int, base: Three, n: int) -> None:
 
 
 @kernel
-def _add_measurements(w: Array, g: Array) -> None:
-    rate, force = _three(g, share.RATE), _three(g, share.FORCE)
-    for i in range(LANES):
-        _write_offset(w, i, bank.DTHETA, rate, 0)
-        _write_offset(w, i, bank.DVEL, force, 3)
-    # apart from the loop over lanes, which with another array in it would not vectorize
-    for n in range(6 * LANES):
-        g[share.LANE_SUMS + n] += w[bank.OFFSET + n]
-
-
-@kernel
-def _add_states(w: Array, g: Array) -> None:
-    r, v = _three(g, share.POSITION), _three(g, share.VELOCITY)
-    q, last = _three(g, share.QUATERNION), g[share.QUATERNION + 3]
+def add_to_means(w: Array, g: Array) -> None:
+    """Add the IMUs of a block to the means of states and measurements. Lanes without an IMU have weight 0."""
+    r, v = _three(g, share.BASES), _three(g, share.BASES + 3)
+    q, last = _three(g, share.BASES + 6), g[share.BASES + 9]
+    rate, force = _three(g, share.BASES + 10), _three(g, share.BASES + 13)
     for i in range(LANES):
         _write_offset(w, i, bank.ORIGIN_POSITION, r, 0)
         _write_offset(w, i, bank.ORIGIN_VELOCITY, v, 3)
         _write_offset(w, i, bank.QUATERNION, q, 6)
         w[bank.OFFSET + 9 * LANES + i] = w[bank.WEIGHT + i] * (w[bank.QUATERNION + 3 * LANES + i] - last)
-    for n in range(10 * LANES):
+        _write_offset(w, i, bank.DTHETA, rate, 10)
+        _write_offset(w, i, bank.DVEL, force, 13)
+    # not in the loop over lanes, which would not vectorize with another array in it
+    for n in range(16 * LANES):
         g[share.LANE_SUMS + n] += w[bank.OFFSET + n]
 
 
 @kernel
-def _clear_sums(g: Array) -> None:
-    for n in range(10 * LANES):
-        g[share.LANE_SUMS + n] = 0.0
-
-
-@kernel
-def _finish_means(g: Array, n: int, to: int, count: int) -> None:
-    """Add the means of the offsets, whose sums begin at the n-th."""
+def _finish_means(g: Array, n: int, to: int, count: int, factor: float) -> None:
+    """Write `count` means from the n-th on, times a factor."""
     scale = 1.0 / g[share.WEIGHTS]
     for f in range(count):
         total = 0.0
         for i in range(LANES):
             total += g[share.LANE_SUMS + (n + f) * LANES + i]
-        g[to + f] += total * scale
+        g[to + f] = (g[share.BASES + n + f] + total * scale) * factor
 
 
 @kernel
-def _three(g: Array, x: int) -> Three:
-    return g[x], g[x + 1], g[x + 2]
+def finish_measurements(g: Array, dt: float) -> None:
+    """Write the mean rate and specific force, paper A (14); axes are parallel by convention."""
+    _finish_means(g, 10, share.RATE, 3, 1.0 / dt)
+    _finish_means(g, 13, share.FORCE, 3, 1.0 / dt)
 
 
 @kernel
-def fuse_measurements(blocks: Array, first: int, last: int, g: Array, dt: float) -> None:
-    """Write the mean rate and specific force of the members, paper A (14); axes are parallel by convention.
-
-    Members of a share begin with a block and have their blocks to themselves: lanes left over have weight 0.
-    """
-    w, lane = blocks[first // LANES], first % LANES
-    for k in range(3):
-        g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane]
-        g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane]
-    if last - first > 1:
-        _clear_sums(g)
-        for b in range(first // LANES, (last + LANES - 1) // LANES):
-            _add_measurements(blocks[b], g)
-        _finish_means(g, 0, share.RATE, 3)
-        _finish_means(g, 3, share.FORCE, 3)
-    per_second = 1.0 / dt
-    for k in range(3):
-        g[share.RATE + k] *= per_second
-        g[share.FORCE + k] *= per_second
-
-
-@kernel
-def fuse_states(blocks: Array, first: int, last: int, g: Array) -> None:
-    """Write the fused state of lanes first ... last - 1: one IMU is itself, several meet at the array origin.
+def finish_states(g: Array) -> None:
+    """Write the mean state at the array origin, paper A (17).
 
     Attitudes are averaged as quaternions, which all members keep on one side of the hypersphere: the normalized sum
     is the rotation mean up to the third power of the spread, at any heading and pitch (paper A averages Euler angles).
     """
+    _finish_means(g, 0, share.POSITION, 3, 1.0)
+    _finish_means(g, 3, share.VELOCITY, 3, 1.0)
+    _finish_means(g, 6, share.QUATERNION, 4, 1.0)
+    _normalize(g)
+    quaternion_to_matrix(g, share.QUATERNION, share.MATRIX)
+
+
+@kernel
+def _add_all(blocks: Array, first: int, last: int, g: Array) -> None:
+    """Means over lanes first ... last - 1, which begin with a block and have their blocks to themselves."""
+    begin_means(blocks[first // LANES], g)
+    for b in range(first // LANES, (last + LANES - 1) // LANES):
+        add_to_means(blocks[b], g)
+
+
+@kernel
+def fuse_measurements(blocks: Array, first: int, last: int, g: Array, dt: float) -> None:
+    """Write the mean rate and specific force of lanes first ... last - 1."""
+    if last - first > 1:
+        _add_all(blocks, first, last, g)
+        finish_measurements(g, dt)
+        return
     w, lane = blocks[first // LANES], first % LANES
+    per_second = 1.0 / dt
+    for k in range(3):
+        g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane] * per_second
+        g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane] * per_second
+
+
+@kernel
+def fuse_states(blocks: Array, first: int, last: int, g: Array) -> None:
+    """Write the fused state of lanes first ... last - 1: one IMU is itself, several meet at the array origin."""
+    if last - first > 1:
+        _add_all(blocks, first, last, g)
+        finish_states(g)
+        return
+    w, lane = blocks[first // LANES], first % LANES
+    for k in range(3):
+        g[share.POSITION + k] = w[bank.POSITION + k * LANES + lane]
+        g[share.VELOCITY + k] = w[bank.VELOCITY + k * LANES + lane]
     for k in range(4):
         g[share.QUATERNION + k] = w[bank.QUATERNION + k * LANES + lane]
-    several = last - first > 1
-    position = bank.ORIGIN_POSITION if several else bank.POSITION
-    velocity = bank.ORIGIN_VELOCITY if several else bank.VELOCITY
-    for k in range(3):
-        g[share.POSITION + k] = w[position + k * LANES + lane]
-        g[share.VELOCITY + k] = w[velocity + k * LANES + lane]
-    if several:
-        _clear_sums(g)
-        for b in range(first // LANES, (last + LANES - 1) // LANES):
-            _add_states(blocks[b], g)
-        _finish_means(g, 0, share.POSITION, 3)
-        _finish_means(g, 3, share.VELOCITY, 3)
-        _finish_means(g, 6, share.QUATERNION, 4)
-        _normalize(g)
-    quaternion_to_matrix(g, share.QUATERNION, share.MATRIX)
+    for k in range(9):
+        g[share.MATRIX + k] = w[bank.MATRIX + k * LANES + lane]
 
 
 @kernel

@@ -39,7 +39,8 @@ RATE = _take(3)  # rad/s
 FORCE = _take(3)  # m/s^2
 VEHICLE = _take(9)  # C_nv of a vehicle with wheels
 WEIGHTS = _take(1)  # sum of the members' weights
-LANE_SUMS = _take(10 * 8)  # work of the means
+BASES = _take(16)  # work of the means, see `fuse`
+LANE_SUMS = _take(16 * 8)
 METRIC = _take(3)  # metres per unit of each coordinate at the last fix
 ANTENNA = _take(3)  # from the point of the fused state, in array axes, m
 # noise of one member
