@@ -150,6 +150,8 @@ def propagate(
         dense.predict_joined(groups, members.shape[0], dt, joined.whole, work[0], work[1])
     if work is None and joined is not None:
         for s in range(members.shape[0]):
+            share.scale_terms(groups[s])
+        for s in range(members.shape[0]):
             for other in range(s + 1, members.shape[0]):
                 joint.predict(groups, s, other, dt, joined.whole, joined.work)
     clock[0] += dt
@@ -333,6 +335,7 @@ def _reopen(state: State, plan: Plan, nis: float, rolling: Rolling | None) -> No
         if not _has_measured(s, rolling, None):
             continue
         g, m = state.groups[s], state.measurements[s]
+        share.complete(g)
         for i in range(share.STATES * share.STRIDE):
             g[share.P + i] *= growth
         kalman.gain(g, m)
@@ -453,7 +456,7 @@ def _log(state: State, outputs: Outputs, time: float) -> None:
         for i in range(state.members[s, 0], state.members[s, 1]):
             for k in range(outputs.log.shape[2]):
                 outputs.log[row, 0, k, i] = state.blocks[i // LANES, bank.ERRORS + k * LANES + i % LANES]
-                outputs.log[row, 1, k, i] = math.sqrt(g[share.P + (9 + k) * (share.STRIDE + 1)])
+                outputs.log[row, 1, k, i] = math.sqrt(share.variance(g, share.NAV + k))
 
 
 @kernel
