@@ -185,7 +185,7 @@ def merge(blocks: Array, groups: Array, members: Array, dt: float) -> None:
 
 @kernel
 def _finish_merging(blocks: Array, groups: Array, members: Array) -> None:
-    """An array has one share for all, or one for each IMU and the mean of all after them."""
+    """Write the fused states of an array, which has one share for all, or one for each IMU and then the mean of all."""
     if members[0, 1] - members[0, 0] == 1:
         for s in range(members.shape[0]):
             fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])

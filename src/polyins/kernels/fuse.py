@@ -193,7 +193,10 @@ def quaternion_to_matrix(g: Array, q: int, c: int) -> None:
 
 @kernel
 def evaluate_at_fused_state(w: Array, g: Array) -> None:
-    """Let the fused state be where the earth is evaluated; its velocity is projected to each IMU's point."""
+    """Let the fused state be where the earth is evaluated and what rotates the velocity increments into n.
+
+    Its velocity is projected to each IMU's point. One loop, since LLVM unrolls shorter ones before it could vectorize.
+    """
     r0, r1, r2 = g[share.POSITION], g[share.POSITION + 1], g[share.POSITION + 2]
     vn, ve, vd = g[share.VELOCITY], g[share.VELOCITY + 1], g[share.VELOCITY + 2]
     c = _matrix(g)
@@ -209,18 +212,11 @@ def evaluate_at_fused_state(w: Array, g: Array) -> None:
         w[bank.AT_POSITION + i] = r0
         w[bank.AT_POSITION + LANES + i] = r1
         w[bank.AT_POSITION + 2 * LANES + i] = r2
-
-
-@kernel
-def rotate_to_n(w: Array, g: Array) -> None:
-    """Rotate the velocity increments into n with the fused attitude at the start of the interval (over DVEL_N)."""
-    c = _matrix(g)
-    for i in range(LANES):
-        x, y, z = w[bank.DVEL_N + i], w[bank.DVEL_N + LANES + i], w[bank.DVEL_N + 2 * LANES + i]
-        n, e, d = _rotated(c, x, y, z)
-        w[bank.DVEL_N + i] = n
-        w[bank.DVEL_N + LANES + i] = e
-        w[bank.DVEL_N + 2 * LANES + i] = d
+        fx, fy, fz = w[bank.DVEL_N + i], w[bank.DVEL_N + LANES + i], w[bank.DVEL_N + 2 * LANES + i]
+        fn, fe, fd = _rotated(c, fx, fy, fz)
+        w[bank.DVEL_N + i] = fn
+        w[bank.DVEL_N + LANES + i] = fe
+        w[bank.DVEL_N + 2 * LANES + i] = fd
 
 
 @kernel
@@ -230,7 +226,6 @@ def mechanize_at_fused_state(w: Array, g: Array, dt: float, ratio: float, near: 
     RATE is that of the last interval, with which the velocity came from the IMU to the origin.
     """
     strapdown.correct_coning_and_sculling(w, ratio)
-    rotate_to_n(w, g)
     evaluate_at_fused_state(w, g)
     strapdown.advance(w, dt, near)
 

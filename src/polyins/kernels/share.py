@@ -68,6 +68,9 @@ Z = _take(NAV * SENSORS)
 SIZE = _layout.size
 
 _V, _P, _G, _A, _GS, _AS = 3, 6, 9, 12, 15, 18
+MEAN_RADIUS = earth.A * math.sqrt(1.0 - earth.E2)
+"""m, which over 1 - e^2 sin^2 is sqrt(R_M R_N)"""
+
 BY_N, BY_E, BY_D, BY_VN, BY_VE, BY_VD = (F + k * HALF for k in range(6))
 
 
@@ -82,14 +85,18 @@ def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: floa
     cos_d = 1.0 - d * d * (0.5 - d * d / 24.0)
     s = sine * cos_d + cosine * sin_d
     c = cosine * cos_d - sine * sin_d
-    t = s / c
     w2 = 1.0 - earth.E2 * s * s
-    r_n = earth.A / math.sqrt(w2)
-    r_m = r_n * (1.0 - earth.E2) / w2
+    root = math.sqrt(w2)
     height = g[POSITION + 2]
     gravity = earth.normal_gravity(s * s, height)
-    m = 1.0 / (r_m + height)
-    n = 1.0 / (r_n + height)
+    # 1 / (R_M + h), 1 / (R_N + h) and the tangent by one division, see `earth.evaluate`
+    east = earth.A + height * root
+    north = earth.A * (1.0 - earth.E2) + height * root * w2
+    inverse = 1.0 / (north * east * c)
+    m = root * w2 * (inverse * east * c)
+    n = root * (inverse * north * c)
+    t = s * (inverse * north * east)
+    by_height = 2.0 * gravity * w2 / (MEAN_RADIUS + height * w2)
     rate = earth.EARTH_RATE_RAD_S
     vn, ve, vd = g[VELOCITY], g[VELOCITY + 1], g[VELOCITY + 2]
     wn, wd = rate * c, -rate * s
@@ -107,7 +114,7 @@ def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: floa
     g[BY_N + 4] = (2.0 * (vn * wn + vd * wd) + vn * ve * n * sec2) * m * dt
     g[BY_D + 4] = (ve * vd + vn * ve * t) * n * n * dt
     g[BY_N + 5] = -2.0 * ve * wd * m * dt
-    g[BY_D + 5] = (-ve * ve * n * n - vn * vn * m * m + 2.0 * gravity / (math.sqrt(r_m * r_n) + height)) * dt
+    g[BY_D + 5] = (-ve * ve * n * n - vn * vn * m * m + by_height) * dt
 
     g[BY_VN + 3] = vd * m * dt
     g[BY_VE + 3] = 2.0 * (wd + td) * dt
@@ -225,6 +232,7 @@ def _times(f: Row, r: Three, v: Three, p1: float, p2: float) -> float:
 
 @kernel
 def _position_rows(g: Array, dt: float) -> None:
+    """Three rows of T = A [N C]."""
     f0, f1 = _factors(g, F + 0), _factors(g, F + 1)
     for j in range(STRIDE):
         r = _column(g, P + j, STRIDE)
@@ -235,26 +243,47 @@ def _position_rows(g: Array, dt: float) -> None:
 
 
 @kernel
-def _three_rows(g: Array, i: int) -> None:
-    """Rows of velocity or of phi, from row i on."""
+def _velocity_rows(g: Array) -> None:
+    """Three rows of T = A [N C]."""
     # all factors before the loop: loads in it that do not move would keep it from vectorizing
-    f0, f1, f2 = _row(g, i, _P + 1, _P + 2), _row(g, i + 1, _P + 2, _P + 0), _row(g, i + 2, _P + 0, _P + 1)
+    f0, f1, f2 = (
+        _row(g, _V + 0, _P + 1, _P + 2),
+        _row(g, _V + 1, _P + 2, _P + 0),
+        _row(g, _V + 2, _P + 0, _P + 1),
+    )
     for j in range(STRIDE):
         r = _column(g, P + j, STRIDE)
         v = _column(g, P + _V * STRIDE + j, STRIDE)
         p = _column(g, P + _P * STRIDE + j, STRIDE)
-        own = _column(g, P + i * STRIDE + j, STRIDE)
-        g[T + i * STRIDE + j] = own[0] + _times(f0, r, v, p[1], p[2])
-        g[T + (i + 1) * STRIDE + j] = own[1] + _times(f1, r, v, p[2], p[0])
-        g[T + (i + 2) * STRIDE + j] = own[2] + _times(f2, r, v, p[0], p[1])
+        g[T + (_V + 0) * STRIDE + j] = v[0] + _times(f0, r, v, p[1], p[2])
+        g[T + (_V + 1) * STRIDE + j] = v[1] + _times(f1, r, v, p[2], p[0])
+        g[T + (_V + 2) * STRIDE + j] = v[2] + _times(f2, r, v, p[0], p[1])
+
+
+@kernel
+def _phi_rows(g: Array) -> None:
+    """Three rows of T = A [N C]."""
+    # all factors before the loop: loads in it that do not move would keep it from vectorizing
+    f0, f1, f2 = (
+        _row(g, _P + 0, _P + 1, _P + 2),
+        _row(g, _P + 1, _P + 2, _P + 0),
+        _row(g, _P + 2, _P + 0, _P + 1),
+    )
+    for j in range(STRIDE):
+        r = _column(g, P + j, STRIDE)
+        v = _column(g, P + _V * STRIDE + j, STRIDE)
+        p = _column(g, P + _P * STRIDE + j, STRIDE)
+        g[T + (_P + 0) * STRIDE + j] = p[0] + _times(f0, r, v, p[1], p[2])
+        g[T + (_P + 1) * STRIDE + j] = p[1] + _times(f1, r, v, p[2], p[0])
+        g[T + (_P + 2) * STRIDE + j] = p[2] + _times(f2, r, v, p[0], p[1])
 
 
 @kernel
 def _through_navigation(g: Array, dt: float) -> None:
     """T = A [N C], in parts whose factors stay in registers."""
     _position_rows(g, dt)
-    _three_rows(g, _V)
-    _three_rows(g, _P)
+    _velocity_rows(g)
+    _phi_rows(g)
 
 
 @kernel
@@ -264,7 +293,8 @@ def _scale(g: Array, dt: float) -> None:
     With x = s x' an IMU error that decays, x <- (1 - dt / tau) x, is a constant x' and a smaller s. The half of the
     noise that comes after a step is added with that before the next: both are divided by the same s^2.
     """
-    if g[SINCE] * g[FASTEST] > 1.0:  # at times that do not depend on what is measured, so that replays are bit-equal
+    # scales must not vanish; not when something looks at P, so that what comes of a replay does not depend on that
+    if g[SINCE] * g[FASTEST] > 1.0:
         complete(g)
     g[SINCE] += dt
     half = 0.5 * (g[OWED] + dt)
@@ -401,8 +431,8 @@ def predict(g: Array, dt: float) -> None:
         C <- A C + G B,    N <- A N A' + W G' + (W G')',    W = A C + G B / 2
 
     G is C_nb times the errors of rate and force, to which a bias adds itself and a scale what it multiplies. Only what
-    is neither zero nor one is multiplied. C' and the scales are left behind: `complete` brings P up to date, and who only looks at P heeds
-    `scale_of` and `owed`, so that a look changes no bit.
+    is neither zero nor one is multiplied. C' and the scales are left behind: `complete` brings P up to date, and who
+    only looks at P heeds `scale_of` and `owed`, so that a look changes no bit.
     """
     _scale(g, dt)
     _add_half_noise(g)
@@ -425,7 +455,7 @@ def mirror(g: Array) -> None:
 
 @kernel
 def scale_of(g: Array, state: int) -> float:
-    """What P takes for one unit of a state: 1 but for IMU errors."""
+    """Return what P takes for one unit of a state: 1 but for IMU errors."""
     if NAV <= state < INERTIAL:
         return 1.0 - g[LOST + state - NAV]
     return 1.0
