@@ -457,7 +457,8 @@ def mirror(g: Array) -> None:
 def scale_of(g: Array, state: int) -> float:
     """Return what P takes for one unit of a state: 1 but for IMU errors."""
     if NAV <= state < INERTIAL:
-        return 1.0 - g[LOST + state - NAV]
+        scale: float = 1.0 - g[LOST + state - NAV]
+        return scale
     return 1.0
 
 
@@ -465,7 +466,8 @@ def scale_of(g: Array, state: int) -> float:
 def owed(g: Array, state: int) -> float:
     """Return the noise that is yet to be added to the variance of a state."""
     if NAV <= state < INERTIAL:
-        return 0.5 * g[OWED] * g[ERROR_PSD + state - NAV]
+        noise: float = 0.5 * g[OWED] * g[ERROR_PSD + state - NAV]
+        return noise
     return 0.0
 
 
@@ -473,7 +475,8 @@ def owed(g: Array, state: int) -> float:
 def variance(g: Array, state: int) -> float:
     """Return the variance of a state."""
     scale = scale_of(g, state)
-    return g[P + state * (STRIDE + 1)] * scale * scale + owed(g, state)
+    total: float = g[P + state * (STRIDE + 1)] * scale * scale + owed(g, state)
+    return total
 
 
 @kernel
