@@ -54,7 +54,7 @@ def covariances(run: batch.Prepared) -> Array:
     """P of each share, shape (shares, 21, 21)."""
     out = []
     for g in run.state.groups[: len(run.state.members)]:
-        share.mirror(g)
+        share.complete(g)
         out.append(g[share.P : share.P + 21 * share.STRIDE].reshape(21, share.STRIDE)[:, :21].copy())
     return np.array(out)
 

@@ -47,7 +47,7 @@ def covariance(run: batch.Prepared) -> list[Array]:
         return [whole(run)]
     blocks = []
     for g in run.state.groups[: len(run.state.members)]:
-        share.mirror(g)
+        share.complete(g)
         blocks.append(g[share.P : share.P + N * share.STRIDE].reshape(N, share.STRIDE)[:, :N].copy())
     return blocks
 
@@ -57,7 +57,7 @@ def whole(run: batch.Prepared) -> Array:
     assert run.joined is not None
     P = np.triu(run.joined.whole, 1)
     for s, g in enumerate(run.state.groups[: len(run.state.members)]):
-        share.mirror(g)
+        share.complete(g)
         block = g[share.P : share.P + N * share.STRIDE].reshape(N, share.STRIDE)[:, :N]
         P[N * s : N * s + N, N * s : N * s + N] = np.triu(block)
     return np.asarray(np.triu(P) + np.triu(P, 1).T)

@@ -319,7 +319,6 @@ def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, g
 
 def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None:
     """Give a share the noise of its mean member."""
-    g[share.FACTOR + share.INERTIAL : share.FACTOR + share.STATES] = 1.0
     noise = NoiseGrade.typical([member.imu.noise for member in members])
     std = np.sqrt(np.mean([member.start_error_std**2 for member in members], axis=0))
     variances = np.concatenate([start.position_std, start.velocity_std, start.attitude_std, std]) ** 2
@@ -327,6 +326,7 @@ def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None
         g[share.P + i * (share.STRIDE + 1)] = variance
     g[share.ERROR_PSD : share.ERROR_PSD + 12] = 2.0 * noise.steady_std() ** 2 / noise.correlation_time
     g[share.DECAY : share.DECAY + 12] = 1.0 / noise.correlation_time
+    g[share.FASTEST] = np.max(1.0 / noise.correlation_time)
     g[share.GYRO_PSD : share.GYRO_PSD + 3] = noise.angle_random_walk**2
     g[share.ACCEL_PSD : share.ACCEL_PSD + 3] = noise.velocity_random_walk**2
     g[share.ANTENNA : share.ANTENNA + 3] = members[0].to_antenna if len(members) == 1 else rig.antenna

@@ -119,16 +119,28 @@ def propagate(
     if near[0] != 0.0 and abs(groups[-1, share.POSITION] - near[1]) > 5e-4:
         move_near(near, groups[-1, share.POSITION])
     ratio = dt * dt / (6.0 * clock[1] * (clock[1] + dt))
+    several = members[members.shape[0] - 1, 1] > 1
     for b in range(blocks.shape[0]):
         w = blocks[b]
+        if rolling is not None and rolling.present.shape[0] > 0:
+            strapdown.remember_matrix(w)
         strapdown.compensate(w, fraction, dt)
         if shared_mechanization:
-            fuse.evaluate_at_fused_state(w, groups[0])
+            fuse.mechanize_at_fused_state(w, groups[0], dt, ratio, near)
         else:
-            strapdown.evaluate_at_own_state(w)
+            strapdown.mechanize(w, dt, ratio, near)
+        strapdown.remember(w)
+        if origin is not None and several:
+            fuse.project_to_origin(w, dt)
+            if b == 0:
+                fuse.begin_means(w, groups[-1])
+            fuse.add_to_means(w, groups[-1])
     for s in range(members.shape[0]):
         g = groups[s]
-        fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
+        if origin is not None and members[s, 1] - members[s, 0] > 1:
+            fuse.finish_measurements(g, dt)
+        else:
+            fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
         share.error_model(g, dt, near)
         if work is None:
             share.predict(g, dt)
@@ -138,16 +150,14 @@ def propagate(
         dense.predict_joined(groups, members.shape[0], dt, joined.whole, work[0], work[1])
     if work is None and joined is not None:
         for s in range(members.shape[0]):
+            share.scale_terms(groups[s])
+        for s in range(members.shape[0]):
             for other in range(s + 1, members.shape[0]):
                 joint.predict(groups, s, other, dt, joined.whole, joined.work)
-    for b in range(blocks.shape[0]):
-        w = blocks[b]
-        strapdown.mechanize(w, dt, ratio, near)
-        strapdown.remember(w)
     clock[0] += dt
     clock[1] = dt
     if origin is not None:
-        merge(blocks, groups, members, dt)
+        _finish_merging(blocks, groups, members)
     if rolling is not None:
         fuse.fuse_shares(blocks, groups, members, dt)
         vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
@@ -163,15 +173,24 @@ def move_near(near: Array, latitude: float) -> None:
 
 @kernel
 def merge(blocks: Array, groups: Array, members: Array, dt: float) -> None:
-    """Fuse the members of each share, and all IMUs into the last row of the groups."""
-    shares = members.shape[0]
-    if members[shares - 1, 1] > 1:
+    """Fuse the members of each share, and all IMUs of an array into the last row of the groups."""
+    if members[members.shape[0] - 1, 1] > 1:
         for b in range(blocks.shape[0]):
             fuse.project_to_origin(blocks[b], dt)
-    for s in range(shares):
-        fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
-    if shares > 1:
-        fuse.fuse_states(blocks, 0, members[shares - 1, 1], groups[shares])
+            if b == 0:
+                fuse.begin_means(blocks[b], groups[-1])
+            fuse.add_to_means(blocks[b], groups[-1])
+    _finish_merging(blocks, groups, members)
+
+
+@kernel
+def _finish_merging(blocks: Array, groups: Array, members: Array) -> None:
+    """Write the fused states of an array, which has one share for all, or one for each IMU and then the mean of all."""
+    if members[0, 1] - members[0, 0] == 1:
+        for s in range(members.shape[0]):
+            fuse.fuse_states(blocks, members[s, 0], members[s, 1], groups[s])
+    if members[members.shape[0] - 1, 1] > 1:
+        fuse.finish_states(groups[-1])
 
 
 @kernel
@@ -301,7 +320,8 @@ def _record(state: State, nis: float, innovation: Array, rolling: Rolling | None
             for a in range(3):
                 innovation[a] += state.measurements[s, kalman.RESIDUAL + a]
                 innovation[3 + a] += state.measurements[s, kalman.S + 4 * a]
-    innovation[:6] /= max(measured, 1)
+    for a in range(6):
+        innovation[a] /= max(measured, 1)
     innovation[6] = nis
 
 
@@ -317,6 +337,7 @@ def _reopen(state: State, plan: Plan, nis: float, rolling: Rolling | None) -> No
         if not _has_measured(s, rolling, None):
             continue
         g, m = state.groups[s], state.measurements[s]
+        share.complete(g)
         for i in range(share.STATES * share.STRIDE):
             g[share.P + i] *= growth
         kalman.gain(g, m)
@@ -437,7 +458,7 @@ def _log(state: State, outputs: Outputs, time: float) -> None:
         for i in range(state.members[s, 0], state.members[s, 1]):
             for k in range(outputs.log.shape[2]):
                 outputs.log[row, 0, k, i] = state.blocks[i // LANES, bank.ERRORS + k * LANES + i % LANES]
-                outputs.log[row, 1, k, i] = math.sqrt(g[share.P + (9 + k) * (share.STRIDE + 1)])
+                outputs.log[row, 1, k, i] = math.sqrt(share.variance(g, share.NAV + k))
 
 
 @kernel

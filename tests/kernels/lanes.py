@@ -49,7 +49,7 @@ def attitudes(w: Array) -> Rotation:
 
 
 def covariance(g: Array) -> Array:
-    share.mirror(g)
+    share.complete(g)
     return g[share.P : share.P + 21 * share.STRIDE].reshape(21, share.STRIDE)[:, :21].copy()
 
 

@@ -155,7 +155,7 @@ def _coast(groups: Array, silent: Array, near: Array, dt: float) -> None:
 def _reseed(s: int, groups: Array, joined: Joint | None) -> None:
     """Begin anew with what the vehicle says of a share; what is known of its IMU's errors stays."""
     g = groups[s]
-    share.mirror(g)
+    share.complete(g)
     for i in range(share.NAV):
         for j in range(STATES):
             g[share.P + i * STRIDE + j] = 0.0

@@ -64,6 +64,7 @@ DVEL_N = _take(3)  # velocity increment of the specific force in n
 # the solution seen at the array origin
 ORIGIN_POSITION = _take(3)
 ORIGIN_VELOCITY = _take(3)
+OFFSET = _take(16)  # weighted, of what is averaged from the same of the first IMU; see `fuse`
 RESIDUAL = _take(3)  # of the last measurement
 CORRECTION = _take(24)  # error state of the last update
 

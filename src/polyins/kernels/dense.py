@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from polyins.kernels import share
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, blas_kernel, kernel
 from polyins.kernels.share import HALF, INERTIAL, NAV, STATES, STRIDE, P
 
 NOISES = 18
@@ -24,6 +24,7 @@ def workspace(shares: int = 1) -> tuple[Array, Array]:
 
 @kernel
 def _fill_phi(g: Array, dt: float, phi: Array, o: int) -> None:
+    share.scale_terms(g)
     for k in range(INERTIAL):
         for i in range(NAV):
             phi[o + i, o + k] = g[share.F + k * HALF + i]
@@ -48,7 +49,7 @@ def _fill_noise(g: Array, dt: float, shaping: Array, o: int, n: int) -> None:
         shaping[1, o + NAV + k, n + 6 + k] = g[share.ERROR_PSD + k] * dt
 
 
-@kernel
+@blas_kernel
 def _advance(squares: Array, shaping: Array) -> None:
     """Qd = (Phi Q Phi' + Q) / 2 with Q = G Qc G' dt, then Phi P Phi' + Qd in RESULT: five products."""
     phi, p, q = squares[PHI], squares[COVARIANCE], squares[NOISE]
@@ -70,7 +71,7 @@ def _advance(squares: Array, shaping: Array) -> None:
 @kernel
 def predict(g: Array, dt: float, squares: Array, shaping: Array) -> None:
     """Advance P of one share by dt."""
-    share.mirror(g)
+    share.complete(g)
     _fill_phi(g, dt, squares[PHI], 0)
     _fill_noise(g, dt, shaping, 0, 0)
     for i in range(INERTIAL):
@@ -86,7 +87,7 @@ def predict(g: Array, dt: float, squares: Array, shaping: Array) -> None:
 def predict_joined(groups: Array, shares: int, dt: float, whole: Array, squares: Array, shaping: Array) -> None:
     """Advance the covariance of all shares by dt: blocks on the diagonal in the shares, the others in `whole`."""
     for s in range(shares):
-        share.mirror(groups[s])
+        share.complete(groups[s])
         _fill_phi(groups[s], dt, squares[PHI], s * INERTIAL)
         _fill_noise(groups[s], dt, shaping, s * INERTIAL, s * NOISES)
         for i in range(INERTIAL):

@@ -80,11 +80,14 @@ def evaluate(w: Array, latitude: float, sine: float, cosine: float) -> None:
         c = cosine * cos_d - sine * sin_d
         s2 = s * s
         w2 = 1.0 - E2 * s2
-        r_n = A / math.sqrt(w2)
-        r_m = r_n * (1.0 - E2) / w2
-        per_north = 1.0 / (r_m + height)
-        per_east = 1.0 / (r_n + height)
-        secant = 1.0 / c
+        root = math.sqrt(w2)
+        # R_N = A / root, R_M = A (1 - E2) / root^3; one division for all three reciprocals
+        east = A + height * root
+        north = A * (1.0 - E2) + height * root * w2
+        inverse = 1.0 / (north * east * c)
+        per_north = root * w2 * (inverse * east * c)
+        per_east = root * (inverse * north * c)
+        secant = inverse * north * east
         w[GRAVITY + i] = normal_gravity(s2, height)
         w[EARTH_RATE + i] = EARTH_RATE_RAD_S * c
         w[EARTH_RATE + LANES + i] = -EARTH_RATE_RAD_S * s

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 
-from polyins.kernels import bank, share
+from polyins.kernels import bank, share, strapdown
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, formula, kernel
 
-# field of the bank, place in the share, how many
-MEASUREMENTS = ((bank.DTHETA, share.RATE, 3), (bank.DVEL, share.FORCE, 3))
-STATES = (
-    (bank.ORIGIN_POSITION, share.POSITION, 3),
-    (bank.ORIGIN_VELOCITY, share.VELOCITY, 3),
-    (bank.QUATERNION, share.QUATERNION, 4),
-)
+Three = tuple[float, float, float]
+Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 
 @kernel
@@ -23,11 +18,12 @@ def project_to_origin(w: Array, dt: float) -> None:
 
     The angular rate is the mean over the last `dt` seconds; relative to the earth it is w_ib less earth rate.
     """
+    per_second = 1.0 / dt
     for i in range(LANES):
         lx, ly, lz = w[bank.TO_ORIGIN + i], w[bank.TO_ORIGIN + LANES + i], w[bank.TO_ORIGIN + 2 * LANES + i]
-        ax = w[bank.DTHETA + i] / dt
-        ay = w[bank.DTHETA + LANES + i] / dt
-        az = w[bank.DTHETA + 2 * LANES + i] / dt
+        ax = w[bank.DTHETA + i] * per_second
+        ay = w[bank.DTHETA + LANES + i] * per_second
+        az = w[bank.DTHETA + 2 * LANES + i] * per_second
         m = bank.MATRIX + i
         ln = w[m] * lx + w[m + LANES] * ly + w[m + 2 * LANES] * lz
         le = w[m + 3 * LANES] * lx + w[m + 4 * LANES] * ly + w[m + 5 * LANES] * lz
@@ -44,66 +40,130 @@ def project_to_origin(w: Array, dt: float) -> None:
 
 
 @kernel
-def _mean(blocks: Array, first: int, last: int, field: int, g: Array, to: int, count: int) -> None:
-    """Write the weighted means of `count` fields over lanes first ... last - 1, as offsets from the first lane's.
-
-    Members of a share begin with a block and have their blocks to themselves: lanes left over have weight 0.
-    """
-    for n in range(count * LANES):
+def begin_means(w: Array, g: Array) -> None:
+    """Begin means over blocks of which this is the first: its first IMU is what offsets are taken from."""
+    for k in range(3):
+        g[share.BASES + k] = w[bank.ORIGIN_POSITION + k * LANES]
+        g[share.BASES + 3 + k] = w[bank.ORIGIN_VELOCITY + k * LANES]
+        g[share.BASES + 10 + k] = w[bank.DTHETA + k * LANES]
+        g[share.BASES + 13 + k] = w[bank.DVEL + k * LANES]
+    for k in range(4):
+        g[share.BASES + 6 + k] = w[bank.QUATERNION + k * LANES]
+    for n in range(16 * LANES):
         g[share.LANE_SUMS + n] = 0.0
-    for b in range(first // LANES, (last + LANES - 1) // LANES):
-        w = blocks[b]
-        for f in range(count):
-            base = blocks[first // LANES, field + f * LANES]
-            for i in range(LANES):
-                g[share.LANE_SUMS + f * LANES + i] += w[bank.WEIGHT + i] * (w[field + f * LANES + i] - base)
+
+
+@kernel
+def _three(g: Array, x: int) -> Three:
+    return g[x], g[x + 1], g[x + 2]
+
+
+@formula
+def _write_offset(w: Array, i: int, field: int, base: Three, n: int) -> None:
+    """Write how far a vector of one lane is from the base, weighted, as the n-th number and those after it."""
+    weight = w[bank.WEIGHT + i]
+    w[bank.OFFSET + n * LANES + i] = weight * (w[field + i] - base[0])
+    w[bank.OFFSET + (n + 1) * LANES + i] = weight * (w[field + LANES + i] - base[1])
+    w[bank.OFFSET + (n + 2) * LANES + i] = weight * (w[field + 2 * LANES + i] - base[2])
+
+
+@kernel
+def add_to_means(w: Array, g: Array) -> None:
+    """Add the IMUs of a block to the means of states and measurements. Lanes without an IMU have weight 0."""
+    r, v = _three(g, share.BASES), _three(g, share.BASES + 3)
+    q, last = _three(g, share.BASES + 6), g[share.BASES + 9]
+    rate, force = _three(g, share.BASES + 10), _three(g, share.BASES + 13)
+    for i in range(LANES):
+        _write_offset(w, i, bank.ORIGIN_POSITION, r, 0)
+        _write_offset(w, i, bank.ORIGIN_VELOCITY, v, 3)
+        _write_offset(w, i, bank.QUATERNION, q, 6)
+        w[bank.OFFSET + 9 * LANES + i] = w[bank.WEIGHT + i] * (w[bank.QUATERNION + 3 * LANES + i] - last)
+        _write_offset(w, i, bank.DTHETA, rate, 10)
+        _write_offset(w, i, bank.DVEL, force, 13)
+    # not in the loop over lanes, which would not vectorize with another array in it
+    for n in range(16 * LANES):
+        g[share.LANE_SUMS + n] += w[bank.OFFSET + n]
+
+
+@kernel
+def _finish_means(g: Array, n: int, to: int, count: int, factor: float) -> None:
+    """Write `count` means from the n-th on, times a factor."""
+    scale = 1.0 / g[share.WEIGHTS]
     for f in range(count):
         total = 0.0
         for i in range(LANES):
-            total += g[share.LANE_SUMS + f * LANES + i]
-        g[to + f] = blocks[first // LANES, field + f * LANES] + total / g[share.WEIGHTS]
+            total += g[share.LANE_SUMS + (n + f) * LANES + i]
+        g[to + f] = (g[share.BASES + n + f] + total * scale) * factor
 
 
 @kernel
-def fuse_measurements(blocks: Array, first: int, last: int, g: Array, dt: float) -> None:
-    """Write the mean rate and specific force of the members, paper A (14); axes are parallel by convention."""
-    if last - first == 1:
-        w, lane = blocks[first // LANES], first % LANES
-        for k in range(3):
-            g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane]
-            g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane]
-    else:
-        for field, to, count in MEASUREMENTS:
-            _mean(blocks, first, last, field, g, to, count)
-    per_second = 1.0 / dt
-    for k in range(3):
-        g[share.RATE + k] *= per_second
-        g[share.FORCE + k] *= per_second
+def finish_measurements(g: Array, dt: float) -> None:
+    """Write the mean rate and specific force, paper A (14); axes are parallel by convention."""
+    _finish_means(g, 10, share.RATE, 3, 1.0 / dt)
+    _finish_means(g, 13, share.FORCE, 3, 1.0 / dt)
 
 
 @kernel
-def fuse_states(blocks: Array, first: int, last: int, g: Array) -> None:
-    """Write the fused state of lanes first ... last - 1: one IMU is itself, several meet at the array origin.
+def finish_states(g: Array) -> None:
+    """Write the mean state at the array origin, paper A (17).
 
     Attitudes are averaged as quaternions, which all members keep on one side of the hypersphere: the normalized sum
     is the rotation mean up to the third power of the spread, at any heading and pitch (paper A averages Euler angles).
     """
-    if last - first == 1:
-        block, lane = first // LANES, first % LANES
-        for k in range(3):
-            g[share.POSITION + k] = blocks[block, bank.POSITION + k * LANES + lane]
-            g[share.VELOCITY + k] = blocks[block, bank.VELOCITY + k * LANES + lane]
-        for k in range(4):
-            g[share.QUATERNION + k] = blocks[block, bank.QUATERNION + k * LANES + lane]
-    else:
-        for field, to, count in STATES:
-            _mean(blocks, first, last, field, g, to, count)
-        norm = 0.0
-        for k in range(4):
-            norm += g[share.QUATERNION + k] * g[share.QUATERNION + k]
-        for k in range(4):
-            g[share.QUATERNION + k] /= math.sqrt(norm)
+    _finish_means(g, 0, share.POSITION, 3, 1.0)
+    _finish_means(g, 3, share.VELOCITY, 3, 1.0)
+    _finish_means(g, 6, share.QUATERNION, 4, 1.0)
+    _normalize(g)
     quaternion_to_matrix(g, share.QUATERNION, share.MATRIX)
+
+
+@kernel
+def _add_all(blocks: Array, first: int, last: int, g: Array) -> None:
+    """Means over lanes first ... last - 1, which begin with a block and have their blocks to themselves."""
+    begin_means(blocks[first // LANES], g)
+    for b in range(first // LANES, (last + LANES - 1) // LANES):
+        add_to_means(blocks[b], g)
+
+
+@kernel
+def fuse_measurements(blocks: Array, first: int, last: int, g: Array, dt: float) -> None:
+    """Write the mean rate and specific force of lanes first ... last - 1."""
+    if last - first > 1:
+        _add_all(blocks, first, last, g)
+        finish_measurements(g, dt)
+        return
+    w, lane = blocks[first // LANES], first % LANES
+    per_second = 1.0 / dt
+    for k in range(3):
+        g[share.RATE + k] = w[bank.DTHETA + k * LANES + lane] * per_second
+        g[share.FORCE + k] = w[bank.DVEL + k * LANES + lane] * per_second
+
+
+@kernel
+def fuse_states(blocks: Array, first: int, last: int, g: Array) -> None:
+    """Write the fused state of lanes first ... last - 1: one IMU is itself, several meet at the array origin."""
+    if last - first > 1:
+        _add_all(blocks, first, last, g)
+        finish_states(g)
+        return
+    w, lane = blocks[first // LANES], first % LANES
+    for k in range(3):
+        g[share.POSITION + k] = w[bank.POSITION + k * LANES + lane]
+        g[share.VELOCITY + k] = w[bank.VELOCITY + k * LANES + lane]
+    for k in range(4):
+        g[share.QUATERNION + k] = w[bank.QUATERNION + k * LANES + lane]
+    for k in range(9):
+        g[share.MATRIX + k] = w[bank.MATRIX + k * LANES + lane]
+
+
+@kernel
+def _normalize(g: Array) -> None:
+    norm = 0.0
+    for k in range(4):
+        norm += g[share.QUATERNION + k] * g[share.QUATERNION + k]
+    scale = 1.0 / math.sqrt(norm)
+    for k in range(4):
+        g[share.QUATERNION + k] *= scale
 
 
 @kernel
@@ -133,29 +193,52 @@ def quaternion_to_matrix(g: Array, q: int, c: int) -> None:
 
 @kernel
 def evaluate_at_fused_state(w: Array, g: Array) -> None:
-    """Let the fused state be where the earth is evaluated and what rotates each velocity increment.
+    """Let the fused state be where the earth is evaluated and what rotates the velocity increments into n.
 
-    Its velocity is projected to each IMU's point. Simplification ii of paper A, Table VI.
+    Its velocity is projected to each IMU's point. One loop, since LLVM unrolls shorter ones before it could vectorize.
     """
+    r0, r1, r2 = g[share.POSITION], g[share.POSITION + 1], g[share.POSITION + 2]
+    vn, ve, vd = g[share.VELOCITY], g[share.VELOCITY + 1], g[share.VELOCITY + 2]
+    c = _matrix(g)
+    n, e, d = _rotated(c, g[share.RATE], g[share.RATE + 1], g[share.RATE + 2])
     for i in range(LANES):
         lx, ly, lz = w[bank.TO_ORIGIN + i], w[bank.TO_ORIGIN + LANES + i], w[bank.TO_ORIGIN + 2 * LANES + i]
-        c = share.MATRIX
-        x, y, z = g[share.RATE], g[share.RATE + 1], g[share.RATE + 2]
-        ln = g[c] * lx + g[c + 1] * ly + g[c + 2] * lz
-        le = g[c + 3] * lx + g[c + 4] * ly + g[c + 5] * lz
-        ld = g[c + 6] * lx + g[c + 7] * ly + g[c + 8] * lz
-        rn = g[c] * x + g[c + 1] * y + g[c + 2] * z - w[bank.EARTH_RATE + i]
-        re = g[c + 3] * x + g[c + 4] * y + g[c + 5] * z
-        rd = g[c + 6] * x + g[c + 7] * y + g[c + 8] * z - w[bank.EARTH_RATE + LANES + i]
-        w[bank.AT_VELOCITY + i] = g[share.VELOCITY] - (re * ld - rd * le)
-        w[bank.AT_VELOCITY + LANES + i] = g[share.VELOCITY + 1] - (rd * ln - rn * ld)
-        w[bank.AT_VELOCITY + 2 * LANES + i] = g[share.VELOCITY + 2] - (rn * le - re * ln)
-    for k in range(3):
-        for i in range(LANES):
-            w[bank.AT_POSITION + k * LANES + i] = g[share.POSITION + k]
-    for k in range(9):
-        for i in range(LANES):
-            w[bank.AT_MATRIX + k * LANES + i] = g[share.MATRIX + k]
+        ln, le, ld = _rotated(c, lx, ly, lz)
+        rn = n - w[bank.EARTH_RATE + i]
+        rd = d - w[bank.EARTH_RATE + LANES + i]
+        w[bank.AT_VELOCITY + i] = vn - (e * ld - rd * le)
+        w[bank.AT_VELOCITY + LANES + i] = ve - (rd * ln - rn * ld)
+        w[bank.AT_VELOCITY + 2 * LANES + i] = vd - (rn * le - e * ln)
+        w[bank.AT_POSITION + i] = r0
+        w[bank.AT_POSITION + LANES + i] = r1
+        w[bank.AT_POSITION + 2 * LANES + i] = r2
+        fx, fy, fz = w[bank.DVEL_N + i], w[bank.DVEL_N + LANES + i], w[bank.DVEL_N + 2 * LANES + i]
+        fn, fe, fd = _rotated(c, fx, fy, fz)
+        w[bank.DVEL_N + i] = fn
+        w[bank.DVEL_N + LANES + i] = fe
+        w[bank.DVEL_N + 2 * LANES + i] = fd
+
+
+@kernel
+def mechanize_at_fused_state(w: Array, g: Array, dt: float, ratio: float, near: Array) -> None:
+    """Advance the eight IMUs of a block by `dt` seconds, all from the fused state: simplification ii of paper A, VI.
+
+    RATE is that of the last interval, with which the velocity came from the IMU to the origin.
+    """
+    strapdown.correct_coning_and_sculling(w, ratio)
+    evaluate_at_fused_state(w, g)
+    strapdown.advance(w, dt, near)
+
+
+@kernel
+def _matrix(g: Array) -> Nine:
+    c = share.MATRIX
+    return g[c], g[c + 1], g[c + 2], g[c + 3], g[c + 4], g[c + 5], g[c + 6], g[c + 7], g[c + 8]
+
+
+@formula
+def _rotated(c: Nine, x: float, y: float, z: float) -> Three:
+    return c[0] * x + c[1] * y + c[2] * z, c[3] * x + c[4] * y + c[5] * z, c[6] * x + c[7] * y + c[8] * z
 
 
 @kernel

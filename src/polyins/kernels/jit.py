@@ -45,10 +45,18 @@ def _compiled(function: F, **options: Any) -> F:
 
 
 def kernel(function: F) -> F:
-    """Compile a function of arrays and numbers, cached on disk."""
-    return _compiled(function, cache=True)
+    """Compile a function of arrays and numbers, cached on disk.
+
+    Without Numba's runtime: nothing can allocate, and no view of an array costs an atomic count of references.
+    """
+    return _compiled(function, cache=True, _nrt=False)
+
+
+def blas_kernel(function: F) -> F:
+    """Compile a function that calls BLAS, which Numba does only with its runtime."""
+    return _compiled(function, cache=True, _nrt=True)
 
 
 def formula(function: F) -> F:
     """Compile a formula that is inlined into each loop that uses it, so that the loop vectorizes."""
-    return _compiled(function, inline="always")
+    return _compiled(function, inline="always", _nrt=False)

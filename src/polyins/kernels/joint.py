@@ -44,14 +44,20 @@ def _through(g: Array, dt: float, w: Array) -> None:
         w[TO + 6 * STRIDE + j] = p[0] + share._times(f6, r, v, p[1], p[2])
         w[TO + 7 * STRIDE + j] = p[1] + share._times(f7, r, v, p[2], p[0])
         w[TO + 8 * STRIDE + j] = p[2] + share._times(f8, r, v, p[0], p[1])
-    _through_sensors(g, w, 3, _A, _AS)
-    _through_sensors(g, w, 6, _G, _GS)
+    _through_sensors(g, dt, w, 3, _A, _AS)
+    _through_sensors(g, dt, w, 6, _G, _GS)
     for j in range(3 * STRIDE):
         w[TO + INERTIAL * STRIDE + j] = w[FROM + INERTIAL * STRIDE + j]
 
 
 @kernel
-def _through_sensors(g: Array, w: Array, row: int, bias: int, scale: int) -> None:
+def _decay(g: Array, dt: float, state: int) -> share.Three:
+    d = share.DECAY + state - share.NAV
+    return 1.0 - dt * g[d], 1.0 - dt * g[d + 1], 1.0 - dt * g[d + 2]
+
+
+@kernel
+def _through_sensors(g: Array, dt: float, w: Array, row: int, bias: int, scale: int) -> None:
     """Three rows of navigation states take what biases and scales do to them; those decay."""
     b0, b1, b2 = (
         share._factors(g, F + bias * HALF + row),
@@ -63,7 +69,7 @@ def _through_sensors(g: Array, w: Array, row: int, bias: int, scale: int) -> Non
         share._factors(g, F + scale * HALF + row + 1),
         share._factors(g, F + scale * HALF + row + 2),
     )
-    d, h = share._column(g, share.FACTOR + bias, 1), share._column(g, share.FACTOR + scale, 1)
+    d, h = _decay(g, dt, bias), _decay(g, dt, scale)
     to = TO + row * STRIDE
     for j in range(STRIDE):
         b = share._column(w, FROM + bias * STRIDE + j, STRIDE)
@@ -99,7 +105,7 @@ def predict(groups: Array, a: int, b: int, dt: float, whole: Array, w: Array) ->
 def gather(groups: Array, shares: int, whole: Array) -> None:
     """Complete the square matrix: blocks on the diagonal from the shares, those left of it by symmetry."""
     for s in range(shares):
-        share.mirror(groups[s])
+        share.complete(groups[s])
         for i in range(STATES):
             for j in range(STATES):
                 whole[s * STATES + i, s * STATES + j] = groups[s, P + i * STRIDE + j]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from polyins.kernels.jit import Array, kernel
 from polyins.kernels.layout import Layout
-from polyins.kernels.share import STATES, STRIDE, P, mirror
+from polyins.kernels.share import STATES, STRIDE, P, complete, mirror, owed, scale_of
 
 ROWS = 3
 
@@ -21,6 +21,8 @@ S = _take(ROWS * ROWS)  # innovation covariance
 S_INVERSE = _take(ROWS * ROWS)
 K = _take(STATES * ROWS)
 AH = _take(STATES * ROWS)
+SCALES = _take(STRIDE)
+NOISES = _take(STRIDE)
 RESIDUAL = _take(ROWS)
 
 SIZE = _layout.size
@@ -29,14 +31,17 @@ SIZE = _layout.size
 
 @kernel
 def gain(g: Array, m: Array) -> None:
-    """Write H P, S = H P H' + R, its inverse and K = P H' / S, paper A (8)."""
+    """Write H P, S = H P H' + R, its inverse and K = P H' / S, paper A (8). What P says does not change."""
     mirror(g)
+    for k in range(STATES):
+        m[SCALES + k] = scale_of(g, k)
+        m[NOISES + k] = owed(g, k)
     for a in range(ROWS):
         for j in range(STRIDE):
             total = 0.0
             for k in range(STATES):
-                total += m[H + a * STRIDE + k] * g[P + k * STRIDE + j]
-            m[HP + a * STRIDE + j] = total
+                total += m[H + a * STRIDE + k] * m[SCALES + k] * g[P + k * STRIDE + j]
+            m[HP + a * STRIDE + j] = total * m[SCALES + j] + m[H + a * STRIDE + j] * m[NOISES + j]
     for a in range(ROWS):
         for b in range(ROWS):
             total = 0.0
@@ -95,6 +100,7 @@ def cautious_innovation_squared(m: Array, caution: float) -> float:
 @kernel
 def update_covariance(g: Array, m: Array) -> None:
     """Update P in Joseph form, paper A (10): A = (I - K H) P, then P = A - (A H') K' + K R K'."""
+    complete(g)
     for i in range(STATES):
         k0, k1, k2 = m[K + ROWS * i], m[K + ROWS * i + 1], m[K + ROWS * i + 2]
         for j in range(STRIDE):

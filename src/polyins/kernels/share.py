@@ -39,28 +39,38 @@ RATE = _take(3)  # rad/s
 FORCE = _take(3)  # m/s^2
 VEHICLE = _take(9)  # C_nv of a vehicle with wheels
 WEIGHTS = _take(1)  # sum of the members' weights
-LANE_SUMS = _take(4 * 8)  # work of the means
+BASES = _take(16)  # work of the means, see `fuse`
+LANE_SUMS = _take(16 * 8)
 METRIC = _take(3)  # metres per unit of each coordinate at the last fix
 ANTENNA = _take(3)  # from the point of the fused state, in array axes, m
 # noise of one member
 GYRO_PSD = _take(3)  # angle random walk squared, rad^2/s
 ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
-ERROR_PSD = _take(12)  # 2 sigma^2 / tau of each Gauss-Markov process
-DECAY = _take(12)  # 1 / tau
-FACTOR = _take(STRIDE)  # 1 - dt / tau by column
+ERROR_PSD = _take(16)  # twelve, 2 sigma^2 / tau of each Gauss-Markov process
+DECAY = _take(16)  # twelve, 1 / tau
+LOST = _take(16)  # the IMU errors that P speaks of are those of the filter divided by 1 less this
+OWED = _take(1)  # seconds for which half of their noise is yet to be added
+SINCE = _take(1)  # seconds since P was completed
+FASTEST = _take(1)  # the largest 1 / tau
 # error model times dt: row k holds what state k does to position, velocity and phi, that is F' without its zero rows
 F = _take(INERTIAL * HALF)
-HALF_Q_V = _take(9)
-HALF_Q_P = _take(9)
+HALF_Q = _take(6 * SENSORS)  # by rows of velocity and phi, columns from the second on
 # products
 T = _take(NAV * STRIDE)
 W = _take(NAV * HALF)
-V = _take(NAV * SENSORS)
+SCALE = _take(16)  # 1 - LOST
+NOISE = _take(16)
+RATIO = _take(SENSORS)  # what a scale does for each unit of what the bias beside it does
+U = _take(NAV * SENSORS)
+S = _take(NAV * SENSORS)
 Z = _take(NAV * SENSORS)
 
 SIZE = _layout.size
 
 _V, _P, _G, _A, _GS, _AS = 3, 6, 9, 12, 15, 18
+MEAN_RADIUS = earth.A * math.sqrt(1.0 - earth.E2)
+"""m, which over 1 - e^2 sin^2 is sqrt(R_M R_N)"""
+
 BY_N, BY_E, BY_D, BY_VN, BY_VE, BY_VD = (F + k * HALF for k in range(6))
 
 
@@ -75,14 +85,18 @@ def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: floa
     cos_d = 1.0 - d * d * (0.5 - d * d / 24.0)
     s = sine * cos_d + cosine * sin_d
     c = cosine * cos_d - sine * sin_d
-    t = s / c
     w2 = 1.0 - earth.E2 * s * s
-    r_n = earth.A / math.sqrt(w2)
-    r_m = r_n * (1.0 - earth.E2) / w2
+    root = math.sqrt(w2)
     height = g[POSITION + 2]
     gravity = earth.normal_gravity(s * s, height)
-    m = 1.0 / (r_m + height)
-    n = 1.0 / (r_n + height)
+    # 1 / (R_M + h), 1 / (R_N + h) and the tangent by one division, see `earth.evaluate`
+    east = earth.A + height * root
+    north = earth.A * (1.0 - earth.E2) + height * root * w2
+    inverse = 1.0 / (north * east * c)
+    m = root * w2 * (inverse * east * c)
+    n = root * (inverse * north * c)
+    t = s * (inverse * north * east)
+    by_height = 2.0 * gravity * w2 / (MEAN_RADIUS + height * w2)
     rate = earth.EARTH_RATE_RAD_S
     vn, ve, vd = g[VELOCITY], g[VELOCITY + 1], g[VELOCITY + 2]
     wn, wd = rate * c, -rate * s
@@ -100,7 +114,7 @@ def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: floa
     g[BY_N + 4] = (2.0 * (vn * wn + vd * wd) + vn * ve * n * sec2) * m * dt
     g[BY_D + 4] = (ve * vd + vn * ve * t) * n * n * dt
     g[BY_N + 5] = -2.0 * ve * wd * m * dt
-    g[BY_D + 5] = (-ve * ve * n * n - vn * vn * m * m + 2.0 * gravity / (math.sqrt(r_m * r_n) + height)) * dt
+    g[BY_D + 5] = (-ve * ve * n * n - vn * vn * m * m + by_height) * dt
 
     g[BY_VN + 3] = vd * m * dt
     g[BY_VE + 3] = 2.0 * (wd + td) * dt
@@ -135,7 +149,7 @@ def _skew(g: Array, row: int, column: int, x: float, y: float, z: float) -> None
 
 @kernel
 def _sensor_terms(g: Array, dt: float) -> None:
-    """Write the terms of F dt that come from attitude and measurements, and half of the noise over dt."""
+    """Write the terms of F dt that come from attitude and biases, and half of the noise over dt."""
     fx, fy, fz = g[FORCE], g[FORCE + 1], g[FORCE + 2]
     n = g[MATRIX] * fx + g[MATRIX + 1] * fy + g[MATRIX + 2] * fz
     e = g[MATRIX + 3] * fx + g[MATRIX + 4] * fy + g[MATRIX + 5] * fz
@@ -145,22 +159,37 @@ def _sensor_terms(g: Array, dt: float) -> None:
         for j in range(3):
             c = g[MATRIX + 3 * i + j] * dt
             g[F + (_A + j) * HALF + _V + i] = c
-            g[F + (_AS + j) * HALF + _V + i] = c * g[FORCE + j]
             g[F + (_G + j) * HALF + _P + i] = -c
-            g[F + (_GS + j) * HALF + _P + i] = -c * g[RATE + j]
+        for j in range(i, 3):
             q_v = 0.0
             q_p = 0.0
             for k in range(3):
                 cc = g[MATRIX + 3 * i + k] * g[MATRIX + 3 * j + k]
                 q_v += cc * g[ACCEL_PSD + k]
                 q_p += cc * g[GYRO_PSD + k]
-            g[HALF_Q_V + 3 * i + j] = 0.5 * dt * q_v
-            g[HALF_Q_P + 3 * i + j] = 0.5 * dt * q_p
+            _put_half_noise(g, i, j, 2, 0.5 * dt * q_v)
+            _put_half_noise(g, 3 + i, 3 + j, 2, 0.5 * dt * q_p)
+
+
+@kernel
+def _put_half_noise(g: Array, i: int, j: int, offset: int, q: float) -> None:
+    """Write an element of the symmetric noise; columns are counted from `offset` before that of the first row."""
+    g[HALF_Q + i * SENSORS + offset + j] = q
+    g[HALF_Q + j * SENSORS + offset + i] = q
+
+
+@kernel
+def scale_terms(g: Array) -> None:
+    """Write the terms of F dt that come from scales, which `predict` does without."""
+    for k in range(3):
+        for i in range(3):
+            g[F + (_AS + k) * HALF + _V + i] = g[F + (_A + k) * HALF + _V + i] * g[FORCE + k]
+            g[F + (_GS + k) * HALF + _P + i] = g[F + (_G + k) * HALF + _P + i] * g[RATE + k]
 
 
 @kernel
 def error_model(g: Array, dt: float, near: Array) -> None:
-    """Write F dt and Q dt / 2 at the fused state, which is that of the start of the interval."""
+    """Write F dt, but for the terms of scales, and Q dt / 2 at the fused state, that of the start of the interval."""
     for i in range(3):
         g[F + (_V + i) * HALF + i] = dt
     if near[0] != 0.0:
@@ -202,102 +231,163 @@ def _times(f: Row, r: Three, v: Three, p1: float, p2: float) -> float:
 
 
 @kernel
-def _through_navigation(g: Array, dt: float) -> None:
-    """T = A [N C]."""
-    # all factors before the loop: loads in it that do not move would keep it from vectorizing
+def _position_rows(g: Array, dt: float) -> None:
+    """Three rows of T = A [N C]."""
     f0, f1 = _factors(g, F + 0), _factors(g, F + 1)
-    f3, f4, f5 = _row(g, _V + 0, _P + 1, _P + 2), _row(g, _V + 1, _P + 2, _P + 0), _row(g, _V + 2, _P + 0, _P + 1)
-    f6, f7, f8 = _row(g, _P + 0, _P + 1, _P + 2), _row(g, _P + 1, _P + 2, _P + 0), _row(g, _P + 2, _P + 0, _P + 1)
+    for j in range(STRIDE):
+        r = _column(g, P + j, STRIDE)
+        v = _column(g, P + _V * STRIDE + j, STRIDE)
+        g[T + j] = r[0] + dt * v[0] + _dot(f0, r)
+        g[T + STRIDE + j] = r[1] + dt * v[1] + _dot(f1, r)
+        g[T + 2 * STRIDE + j] = r[2] + dt * v[2]
+
+
+@kernel
+def _velocity_rows(g: Array) -> None:
+    """Three rows of T = A [N C]."""
+    # all factors before the loop: loads in it that do not move would keep it from vectorizing
+    f0, f1, f2 = (
+        _row(g, _V + 0, _P + 1, _P + 2),
+        _row(g, _V + 1, _P + 2, _P + 0),
+        _row(g, _V + 2, _P + 0, _P + 1),
+    )
     for j in range(STRIDE):
         r = _column(g, P + j, STRIDE)
         v = _column(g, P + _V * STRIDE + j, STRIDE)
         p = _column(g, P + _P * STRIDE + j, STRIDE)
-        g[T + j] = r[0] + dt * v[0] + _dot(f0, r)
-        g[T + STRIDE + j] = r[1] + dt * v[1] + _dot(f1, r)
-        g[T + 2 * STRIDE + j] = r[2] + dt * v[2]
-        g[T + 3 * STRIDE + j] = v[0] + _times(f3, r, v, p[1], p[2])
-        g[T + 4 * STRIDE + j] = v[1] + _times(f4, r, v, p[2], p[0])
-        g[T + 5 * STRIDE + j] = v[2] + _times(f5, r, v, p[0], p[1])
-        g[T + 6 * STRIDE + j] = p[0] + _times(f6, r, v, p[1], p[2])
-        g[T + 7 * STRIDE + j] = p[1] + _times(f7, r, v, p[2], p[0])
-        g[T + 8 * STRIDE + j] = p[2] + _times(f8, r, v, p[0], p[1])
+        g[T + (_V + 0) * STRIDE + j] = v[0] + _times(f0, r, v, p[1], p[2])
+        g[T + (_V + 1) * STRIDE + j] = v[1] + _times(f1, r, v, p[2], p[0])
+        g[T + (_V + 2) * STRIDE + j] = v[2] + _times(f2, r, v, p[0], p[1])
 
 
 @kernel
-def _put_c(g: Array, row: int, half_row: int, j: int, half: float) -> None:
-    """Element of W = A C + G B / 2 and of the new C = (A C + G B) D, in the rows that begin at these offsets."""
-    w = g[T + row + SENSORS + j] + half
-    g[W + half_row + j] = w
-    g[P + row + SENSORS + j] = g[FACTOR + SENSORS + j] * (w + half)
+def _phi_rows(g: Array) -> None:
+    """Three rows of T = A [N C]."""
+    # all factors before the loop: loads in it that do not move would keep it from vectorizing
+    f0, f1, f2 = (
+        _row(g, _P + 0, _P + 1, _P + 2),
+        _row(g, _P + 1, _P + 2, _P + 0),
+        _row(g, _P + 2, _P + 0, _P + 1),
+    )
+    for j in range(STRIDE):
+        r = _column(g, P + j, STRIDE)
+        v = _column(g, P + _V * STRIDE + j, STRIDE)
+        p = _column(g, P + _P * STRIDE + j, STRIDE)
+        g[T + (_P + 0) * STRIDE + j] = p[0] + _times(f0, r, v, p[1], p[2])
+        g[T + (_P + 1) * STRIDE + j] = p[1] + _times(f1, r, v, p[2], p[0])
+        g[T + (_P + 2) * STRIDE + j] = p[2] + _times(f2, r, v, p[0], p[1])
 
 
 @kernel
-def _half(f: Three, b: Three, h: Three, s: Three) -> float:
-    return 0.5 * (_dot(f, b) + _dot(h, s))
+def _through_navigation(g: Array, dt: float) -> None:
+    """T = A [N C], in parts whose factors stay in registers."""
+    _position_rows(g, dt)
+    _velocity_rows(g)
+    _phi_rows(g)
 
 
 @kernel
-def _decay(g: Array, row: int, j: int, factors: Three, b: Three) -> None:
-    """Three rows of B <- D B D, from the one that begins at this offset on."""
-    factor = g[FACTOR + SENSORS + j]
-    g[P + row + SENSORS + j] = factors[0] * factor * b[0]
-    g[P + row + STRIDE + SENSORS + j] = factors[1] * factor * b[1]
-    g[P + row + 2 * STRIDE + SENSORS + j] = factors[2] * factor * b[2]
+def _scale(g: Array, dt: float) -> None:
+    """Bring scales and noise of the IMU errors up to date.
 
-
-@kernel
-def _through_sensors(g: Array, dt: float) -> None:
-    """Bring B and C up to date and leave W behind."""
+    With x = s x' an IMU error that decays, x <- (1 - dt / tau) x, is a constant x' and a smaller s. The half of the
+    noise that comes after a step is added with that before the next: both are divided by the same s^2.
+    """
+    # scales must not vanish; not when something looks at P, so that what comes of a replay does not depend on that
+    if g[SINCE] * g[FASTEST] > 1.0:
+        complete(g)
+    g[SINCE] += dt
+    half = 0.5 * (g[OWED] + dt)
+    g[OWED] = dt
+    for k in range(HALF):
+        scale = 1.0 - g[LOST + k]
+        g[SCALE + k] = scale
+        g[NOISE + k] = half * g[ERROR_PSD + k] / (scale * scale)
+        g[LOST + k] += scale * (dt * g[DECAY + k])
     for k in range(12):
-        g[FACTOR + NAV + k] = 1.0 - dt * g[DECAY + k]
+        g[P + (NAV + k) * (STRIDE + 1)] += g[NOISE + k]
+    for k in range(6):
+        g[RATIO + k] = g[RATE + k] * g[SCALE + 6 + k]
+
+
+@kernel
+def _felt(s: Three, b: Three, ratio: Three, h: Three) -> Three:
+    """Errors of a measured vector that biases and scales make."""
+    return s[0] * b[0] + ratio[0] * h[0], s[1] * b[1] + ratio[1] * h[1], s[2] * b[2] + ratio[2] * h[2]
+
+
+@kernel
+def _put_c(g: Array, row: int, j: int, own: float) -> None:
+    """Element of C <- A C + G B and of W = A C + G B / 2."""
+    t = g[T + row * STRIDE + SENSORS + j]
+    g[P + row * STRIDE + SENSORS + j] = t + own
+    g[W + row * HALF + j] = t + 0.5 * own
+
+
+@kernel
+def _through_sensors(g: Array) -> None:
+    """Bring C up to date and leave W behind."""
+    s_b, s_a = _column(g, SCALE, 1), _column(g, SCALE + 3, 1)
+    h_b, h_a = _column(g, RATIO, 1), _column(g, RATIO + 3, 1)
     f3, f4, f5 = _factors(g, F + _A * HALF + 3), _factors(g, F + _A * HALF + 4), _factors(g, F + _A * HALF + 5)
     f6, f7, f8 = _factors(g, F + _G * HALF + 6), _factors(g, F + _G * HALF + 7), _factors(g, F + _G * HALF + 8)
-    h3, h4, h5 = _factors(g, F + _AS * HALF + 3), _factors(g, F + _AS * HALF + 4), _factors(g, F + _AS * HALF + 5)
-    h6, h7, h8 = _factors(g, F + _GS * HALF + 6), _factors(g, F + _GS * HALF + 7), _factors(g, F + _GS * HALF + 8)
-    d_b, d_a = _column(g, FACTOR + _G, 1), _column(g, FACTOR + _A, 1)
-    d_sb, d_sa = _column(g, FACTOR + _GS, 1), _column(g, FACTOR + _AS, 1)
     for j in range(HALF):
         b = _column(g, P + _G * STRIDE + SENSORS + j, STRIDE)
         a = _column(g, P + _A * STRIDE + SENSORS + j, STRIDE)
         sb = _column(g, P + _GS * STRIDE + SENSORS + j, STRIDE)
         sa = _column(g, P + _AS * STRIDE + SENSORS + j, STRIDE)
-        _put_c(g, 0 * STRIDE, 0 * HALF, j, 0.0)
-        _put_c(g, 1 * STRIDE, 1 * HALF, j, 0.0)
-        _put_c(g, 2 * STRIDE, 2 * HALF, j, 0.0)
-        _put_c(g, 3 * STRIDE, 3 * HALF, j, _half(f3, a, h3, sa))
-        _put_c(g, 4 * STRIDE, 4 * HALF, j, _half(f4, a, h4, sa))
-        _put_c(g, 5 * STRIDE, 5 * HALF, j, _half(f5, a, h5, sa))
-        _put_c(g, 6 * STRIDE, 6 * HALF, j, _half(f6, b, h6, sb))
-        _put_c(g, 7 * STRIDE, 7 * HALF, j, _half(f7, b, h7, sb))
-        _put_c(g, 8 * STRIDE, 8 * HALF, j, _half(f8, b, h8, sb))
-        _decay(g, _G * STRIDE, j, d_b, b)
-        _decay(g, _A * STRIDE, j, d_a, a)
-        _decay(g, _GS * STRIDE, j, d_sb, sb)
-        _decay(g, _AS * STRIDE, j, d_sa, sa)
+        rate, force = _felt(s_b, b, h_b, sb), _felt(s_a, a, h_a, sa)
+        _put_c(g, 0, j, 0.0)
+        _put_c(g, 1, j, 0.0)
+        _put_c(g, 2, j, 0.0)
+        _put_c(g, 3, j, _dot(f3, force))
+        _put_c(g, 4, j, _dot(f4, force))
+        _put_c(g, 5, j, _dot(f5, force))
+        _put_c(g, 6, j, _dot(f6, rate))
+        _put_c(g, 7, j, _dot(f7, rate))
+        _put_c(g, 8, j, _dot(f8, rate))
+
+
+@kernel
+def _put_u(g: Array, i: int, j: int, scale: float, ratio: float) -> None:
+    w = W + i * HALF + NAV - SENSORS + j
+    g[U + i * SENSORS + j] = g[w] * scale + g[w + 6] * ratio
+
+
+@kernel
+def _felt_by_rows(g: Array) -> None:
+    """U = what W says of the errors of rate and force, which biases and scales make."""
+    for j in range(SENSORS):
+        scale, ratio = g[SCALE + j], g[RATIO + j]
+        _put_u(g, 0, j, scale, ratio)
+        _put_u(g, 1, j, scale, ratio)
+        _put_u(g, 2, j, scale, ratio)
+        _put_u(g, 3, j, scale, ratio)
+        _put_u(g, 4, j, scale, ratio)
+        _put_u(g, 5, j, scale, ratio)
+        _put_u(g, 6, j, scale, ratio)
+        _put_u(g, 7, j, scale, ratio)
+        _put_u(g, 8, j, scale, ratio)
 
 
 @kernel
 def _back_row(g: Array, i: int) -> None:
-    """Row i of V = (A N) A' and of Z = W G', the first eight columns."""
-    t, w = T + i * STRIDE, W + i * HALF - SENSORS
+    """Row i of S = (A N) A' + W G' + Q / 2 and of Z = W G', all columns but the first."""
+    t, u = T + i * STRIDE, U + i * SENSORS
     r, v, p = _column(g, t, 1), _column(g, t + _V, 1), _column(g, t + _P, 1)
-    b, a = _column(g, w + _G, 1), _column(g, w + _A, 1)
-    sb, sa = _column(g, w + _GS, 1), _column(g, w + _AS, 1)
+    b, a = _column(g, u, 1), _column(g, u + 3, 1)
     for j in range(SENSORS):
-        f = F + j
-        g[V + i * SENSORS + j] = (
-            (g[t + j] + _dot(r, _column(g, f, HALF)))
-            + _dot(v, _column(g, f + _V * HALF, HALF))
-            + _dot(p, _column(g, f + _P * HALF, HALF))
-        )
-        g[Z + i * SENSORS + j] = (
-            _dot(b, _column(g, f + _G * HALF, HALF)) + _dot(a, _column(g, f + _A * HALF, HALF))
-        ) + (_dot(sb, _column(g, f + _GS * HALF, HALF)) + _dot(sa, _column(g, f + _AS * HALF, HALF)))
+        f = F + 1 + j
+        z = _dot(b, _column(g, f + _G * HALF, HALF)) + _dot(a, _column(g, f + _A * HALF, HALF))
+        g[Z + i * SENSORS + j] = z
+        n = g[t + 1 + j] + _dot(r, _column(g, f, HALF))
+        n += _dot(v, _column(g, f + _V * HALF, HALF)) + _dot(p, _column(g, f + _P * HALF, HALF))
+        g[S + i * SENSORS + j] = n + z
 
 
 @kernel
 def _back_to_navigation(g: Array) -> None:
-    """N = V + Z + Z'; the loop makes the first eight columns, the ninth follows from symmetry."""
+    """N = S + Z', the upper triangle and by symmetry the lower one."""
     _back_row(g, 0)
     _back_row(g, 1)
     _back_row(g, 2)
@@ -307,38 +397,28 @@ def _back_to_navigation(g: Array) -> None:
     _back_row(g, 6)
     _back_row(g, 7)
     _back_row(g, 8)
-    _last_column(g)
-    for i in range(NAV - 1):
-        for j in range(i, NAV - 1):
-            n = g[V + i * SENSORS + j] + (g[Z + i * SENSORS + j] + g[Z + j * SENSORS + i])
-            g[P + i * STRIDE + j] = n
-            g[P + j * STRIDE + i] = n
+    g[P] = g[T] + _dot(_column(g, T, 1), _column(g, F, HALF)) + g[T + _V] * g[F + _V * HALF]
+    for i in range(3):  # no IMU error moves a position: Z' has no such rows
+        for j in range(max(i, 1), NAV):
+            _put_n(g, i, j, g[S + i * SENSORS + j - 1])
+    for i in range(3, NAV):
+        for j in range(i, NAV):
+            n = g[S + i * SENSORS + j - 1] + g[Z + j * SENSORS + i - 1]
+            _put_n(g, i, j, n + g[HALF_Q + (i - 3) * SENSORS + j - 1])
 
 
 @kernel
-def _last_column(g: Array) -> None:
-    last = NAV - 1
-    own = g[T + last * STRIDE + last]
-    for k in range(NAV):
-        own += g[T + last * STRIDE + k] * g[F + k * HALF + last]
-    for i in range(NAV):
-        z = 0.0
-        for k in range(3):
-            z += g[W + i * HALF + _G - SENSORS + k] * g[F + (_G + k) * HALF + last]
-            z += g[W + i * HALF + _GS - SENSORS + k] * g[F + (_GS + k) * HALF + last]
-        n = own + 2.0 * z if i == last else g[V + last * SENSORS + i] + (g[Z + last * SENSORS + i] + z)
-        g[P + i * STRIDE + last] = n
-        g[P + last * STRIDE + i] = n
+def _put_n(g: Array, i: int, j: int, n: float) -> None:
+    g[P + i * STRIDE + j] = n
+    g[P + j * STRIDE + i] = n
 
 
 @kernel
-def _add_half_noise(g: Array, dt: float) -> None:
+def _add_half_noise(g: Array) -> None:
     for i in range(3):
         for j in range(3):
-            g[P + (_V + i) * STRIDE + _V + j] += g[HALF_Q_V + 3 * i + j]
-            g[P + (_P + i) * STRIDE + _P + j] += g[HALF_Q_P + 3 * i + j]
-    for i in range(12):
-        g[P + (NAV + i) * (STRIDE + 1)] += 0.5 * dt * g[ERROR_PSD + i]
+            g[P + (_V + i) * STRIDE + _V + j] += g[HALF_Q + i * SENSORS + 2 + j]
+            g[P + (_P + i) * STRIDE + _P + j] += g[HALF_Q + (3 + i) * SENSORS + 5 + j]
 
 
 @kernel
@@ -346,17 +426,20 @@ def predict(g: Array, dt: float) -> None:
     """Advance P by dt, paper A (5), with Phi = I + F dt and trapezoidal noise.
 
     Phi P Phi' + (Phi Q Phi' + Q) / 2 = Phi (P + Q / 2) Phi' + Q / 2. With P = [N C; C' B] in navigation states and
-    IMU errors and Phi = [A G; 0 D], D diagonal:
+    scaled IMU errors, see `_scale`, Phi = [A G; 0 I] and
 
-        B <- D B D,    C <- (A C + G B) D,    N <- A N A' + W G' + (W G')',    W = A C + G B / 2
+        C <- A C + G B,    N <- A N A' + W G' + (W G')',    W = A C + G B / 2
 
-    Only what is neither zero nor one is multiplied, and C' is left behind: `mirror` brings it up to date.
+    G is C_nb times the errors of rate and force, to which a bias adds itself and a scale what it multiplies. Only what
+    is neither zero nor one is multiplied. C' and the scales are left behind: `complete` brings P up to date, and who
+    only looks at P heeds `scale_of` and `owed`, so that a look changes no bit.
     """
-    _add_half_noise(g, dt)
+    _scale(g, dt)
+    _add_half_noise(g)
     _through_navigation(g, dt)
-    _through_sensors(g, dt)
+    _through_sensors(g)
+    _felt_by_rows(g)
     _back_to_navigation(g)
-    _add_half_noise(g, dt)
 
 
 @kernel
@@ -368,3 +451,46 @@ def mirror(g: Array) -> None:
     for i in range(NAV, INERTIAL):
         for k in range(INERTIAL, STATES):
             g[P + k * STRIDE + i] = g[P + i * STRIDE + k]
+
+
+@kernel
+def scale_of(g: Array, state: int) -> float:
+    """Return what P takes for one unit of a state: 1 but for IMU errors."""
+    if NAV <= state < INERTIAL:
+        scale: float = 1.0 - g[LOST + state - NAV]
+        return scale
+    return 1.0
+
+
+@kernel
+def owed(g: Array, state: int) -> float:
+    """Return the noise that is yet to be added to the variance of a state."""
+    if NAV <= state < INERTIAL:
+        noise: float = 0.5 * g[OWED] * g[ERROR_PSD + state - NAV]
+        return noise
+    return 0.0
+
+
+@kernel
+def variance(g: Array, state: int) -> float:
+    """Return the variance of a state."""
+    scale = scale_of(g, state)
+    total: float = g[P + state * (STRIDE + 1)] * scale * scale + owed(g, state)
+    return total
+
+
+@kernel
+def complete(g: Array) -> None:
+    """Bring all of P up to date after predictions: scales, noise still owed, and the lower left block."""
+    for i in range(STATES):
+        scale = scale_of(g, i)
+        for k in range(NAV, INERTIAL):
+            g[P + i * STRIDE + k] *= scale * (1.0 - g[LOST + k - NAV])
+        for k in range(INERTIAL, STATES):
+            g[P + i * STRIDE + k] *= scale
+        g[P + i * (STRIDE + 1)] += owed(g, i)
+    for k in range(12):
+        g[LOST + k] = 0.0
+    g[OWED] = 0.0
+    g[SINCE] = 0.0
+    mirror(g)

@@ -249,17 +249,14 @@ def count_executions(method: str, imus: int) -> dict[str, int]:
         setattr(module, name, call)
         watched.append((module, name, original))
 
-    def members(_: Any, first: int, last: int, *__: Any) -> int:
-        return int(last - first) if last - first > 1 else 0
-
     prepared = prepare(method, imus)
     watched: list[tuple[Any, str, Any]] = []
     watch(strapdown, "mechanize", "mechanization", lambda w, *_: int((w[bank.WEIGHT : bank.WEIGHT + 8] > 0.0).sum()))
     watch(share, "predict", "prediction", lambda *_: 1)
     watch(kalman, "gain", "gain", lambda *_: 1)
     watch(fuse, "correct_members", "feedback", lambda _, first, last, __: int(last - first))
-    watch(fuse, "fuse_measurements", "measurement_fusion", members)
-    watch(fuse, "fuse_states", "solution_fusion", members)
+    watch(fuse, "finish_measurements", "measurement_fusion", lambda *_: imus)
+    watch(fuse, "finish_states", "solution_fusion", lambda *_: imus)
     fix = float(prepared.inputs.fix_time[prepared.inputs.fix_time > prepared.inputs.time[0] + 0.01][0])
     first = int(np.searchsorted(prepared.inputs.time, fix)) - 1
     prepared.state.counters[0] = int(np.searchsorted(prepared.inputs.fix_time, fix))

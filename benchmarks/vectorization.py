@@ -1,0 +1,61 @@
+"""Count vector and scalar arithmetic in the machine code of the loops over lanes and columns.
+
+    python benchmarks/vectorization.py
+
+Prints a JSON document; exits with 1 if a loop has more scalar than vector arithmetic: then it stopped vectorizing.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+
+from polyins.kernels import bank, earth, fuse, share, strapdown
+
+W, G, NEAR = np.zeros(bank.SIZE), np.zeros(share.SIZE), np.zeros(5)
+
+LOOPS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
+    "compensate": (strapdown.compensate, (W, 1.0, 0.01)),
+    "correct_coning_and_sculling": (strapdown.correct_coning_and_sculling, (W, 0.1)),
+    "evaluate": (earth.evaluate, (W, 0.0, 0.0, 1.0)),
+    "advance": (strapdown.advance, (W, 0.01, NEAR)),
+    "evaluate_at_fused_state": (fuse.evaluate_at_fused_state, (W, G)),
+    "project_to_origin": (fuse.project_to_origin, (W, 0.01)),
+    "add_to_means": (fuse.add_to_means, (W, G)),
+    "position_rows": (share._position_rows, (G, 0.01)),
+    "velocity_rows": (share._velocity_rows, (G,)),
+    "phi_rows": (share._phi_rows, (G,)),
+    "through_sensors": (share._through_sensors, (G,)),
+    "felt_by_rows": (share._felt_by_rows, (G,)),
+}
+
+VECTOR = re.compile(r"^\tv(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\w*)pd\t", re.MULTILINE)
+SCALAR = re.compile(r"^\tv(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\w*)sd\t", re.MULTILINE)
+
+
+def count(function: Callable[..., Any], arguments: tuple[Any, ...]) -> dict[str, int]:
+    """Return how many instructions of each kind a kernel has, compiled as the kernels are."""
+    source: Any = function
+    compiled = numba.njit(error_model="numpy", fastmath={"contract"}, _nrt=False)(source.py_func)
+    compiled(*arguments)
+    code = compiled.inspect_asm(compiled.signatures[0])
+    body = code[: code.index(".Lfunc_end0")]
+    return {"vector": len(VECTOR.findall(body)), "scalar": len(SCALAR.findall(body))}
+
+
+def main() -> int:
+    """Print the counts; return 1 if a loop is scalar."""
+    counts = {name: count(*loop) for name, loop in LOOPS.items()}
+    scalar = [name for name, n in counts.items() if n["scalar"] >= n["vector"]]
+    print(json.dumps({"instructions": counts, "not_vectorized": scalar}, indent=2))
+    return 1 if scalar else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
