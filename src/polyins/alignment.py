@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polyins.errors import InputError
+from polyins.evaluation.attitude import quaternions, rotation_matrices
 from polyins.geodesy import metres_per_unit
 from polyins.kernels import earth
 from polyins.recording import GnssStream, Recording, StartOptions
@@ -452,9 +453,9 @@ class _RollingSearch(_Search):
 
 def usual_velocity(fixes: GnssStream) -> Array:
     """Return the velocities with each component's median over five fixes, m/s, shape (M, 3)."""
-    from scipy.ndimage import median_filter
-
-    return np.asarray(median_filter(fixes.velocity, size=(5, 1), mode="nearest"))
+    assert fixes.velocity is not None
+    padded = np.pad(fixes.velocity, ((2, 2), (0, 0)), mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1))
 
 
 def find_standstill(aligned: Aligned, fixes: GnssStream | None) -> tuple[float, float] | None:
@@ -504,9 +505,13 @@ def level(force: Array, acceleration: Array | None = None, heading: float = 0.0)
 
 def rotation_matrix(attitude: Array) -> Array:
     """Return C_nb of roll, pitch, heading (rad), shape (3, 3)."""
-    from scipy.spatial.transform import Rotation
+    return np.asarray(rotation_matrices(quaternions(attitude[None, :]))[0])
 
-    return np.asarray(Rotation.from_euler("ZYX", attitude[::-1]).as_matrix())
+
+def quaternion(attitude: Array) -> Array:
+    """Return q_nb, scalar first and not negative, of roll, pitch, heading (rad), shape (4,)."""
+    q = quaternions(attitude[None, :])[0]
+    return np.asarray(np.copysign(1.0, q[0]) * q)
 
 
 def earth_rate(position: Array, geodetic: bool) -> Array:

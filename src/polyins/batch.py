@@ -304,14 +304,13 @@ def _state(
 
 def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, geodetic: bool) -> None:
     """Put a member where it is mounted, moving as the turning array does: `rate` is its own, rad/s."""
-    from scipy.spatial.transform import Rotation
 
     c = alignment.rotation_matrix(start.attitude)
     lever_arm = c @ -member.to_origin
     turning = c @ rate - alignment.earth_rate(start.position, geodetic)
     bank.put(w, bank.POSITION, lane, start.position + lever_arm / metres_per_unit(start.position, geodetic))
     bank.put(w, bank.VELOCITY, lane, start.velocity + np.cross(turning, lever_arm))
-    bank.put(w, bank.QUATERNION, lane, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
+    bank.put(w, bank.QUATERNION, lane, alignment.quaternion(start.attitude))
     bank.put(w, bank.ERRORS, lane, member.start_errors)
     bank.put(w, bank.TO_ORIGIN, lane, member.to_origin)
     bank.put(w, bank.TO_ANTENNA, lane, member.to_antenna)

@@ -286,14 +286,13 @@ def fill_lane(w: Array, lane: int, imu: Imu, start: Start, attitude: Array, erro
 
     `attitude`: roll, pitch, heading of the IMU, rad; `errors`: its twelve slow errors.
     """
-    from scipy.spatial.transform import Rotation
 
     c = alignment.rotation_matrix(attitude)
     to_wheel = np.zeros(3) if imu.wheel is None else imu.wheel.lever_arm
     place = alignment.rotation_matrix(start.attitude) @ imu.position - c @ to_wheel
     bank.put(w, bank.POSITION, lane, start.position + place / metres_per_unit(start.position, geodetic))
     bank.put(w, bank.VELOCITY, lane, start.velocity)
-    bank.put(w, bank.QUATERNION, lane, Rotation.from_matrix(c).as_quat(canonical=True, scalar_first=True))
+    bank.put(w, bank.QUATERNION, lane, alignment.quaternion(attitude))
     bank.put(w, bank.ERRORS, lane, errors)
     bank.put(w, bank.WHEEL, lane, np.array([0.0 if imu.wheel is None else imu.wheel.radius]))
     bank.put(w, bank.TO_WHEEL, lane, to_wheel)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from polyins.errors import InputError
+from polyins.io.arrow_arrays import to_numpy
 from polyins.io.files import find, read_bytes
 from polyins.io.rows import Source
 from polyins.recording import Array
@@ -119,7 +120,7 @@ def _text_columns(path: Path, content: bytes, table: Layout, places: list[int], 
 
         cells = _parse(path, content, table, places, binary())
         return [_numbers(path, table, place, column, text_is_nan) for place, column in zip(places, cells, strict=True)]
-    return [column.to_numpy() for column in columns]
+    return [to_numpy(column) for column in columns]
 
 
 def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: Any) -> list[Any]:
@@ -180,6 +181,6 @@ def _parquet_columns(path: str | Path, content: bytes, wanted: Sequence[Column])
     chosen = [names[_place(find(path), names, column)] for column in wanted]
     try:
         table = parquet.read_table(BufferReader(content), columns=chosen)
-        return [table[name].cast(float64(), safe=False).to_numpy() for name in chosen]
+        return [to_numpy(table[name].cast(float64(), safe=False)) for name in chosen]
     except (ArrowException, OSError) as error:
         raise InputError(f"{find(path)}: cannot be read as numbers ({str(error).splitlines()[0]})") from error

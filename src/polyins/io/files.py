@@ -42,7 +42,7 @@ def read_bytes(path: str | Path) -> bytes:
         raise InputError(f"{found}: cannot be unpacked ({error}); expected a whole gzip file") from error
     except OSError as error:
         raise InputError(f"{found}: cannot be read ({error.strerror})") from error
-    if not content.strip():
+    if not content or content.isspace():
         raise InputError(f"{found}: is empty; expected data")
     return content
 

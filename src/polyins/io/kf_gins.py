@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from polyins.errors import InputError
+from polyins.io.arrow_arrays import to_numpy
 from polyins.io.files import find, read_bytes, write_bytes
 from polyins.io.rows import ImuRows, Source, Track, intervals
 from polyins.recording import Array, GnssStream, ImuStream
@@ -129,14 +130,35 @@ def _numbers(path: str | Path, content: bytes, wanted: dict[int, str]) -> Array:
     """Parse rows of numbers between blanks or commas and check how many columns there are."""
     if b"," in content[:4096]:
         content = content.replace(b",", b" ")
-    try:
-        rows = np.loadtxt(content.splitlines(), ndmin=2, comments=None)
-    except ValueError as error:
-        raise _bad_line(find(path), content) from error
+    rows = _evenly_spaced(content)
+    if rows is None:
+        try:
+            rows = np.loadtxt(content.splitlines(), ndmin=2, comments=None)
+        except ValueError as error:
+            raise _bad_line(find(path), content) from error
     if rows.shape[1] not in wanted:
         expected = " or ".join(f"{count} ({names})" for count, names in wanted.items())
         raise InputError(f"{find(path)}: {rows.shape[1]} columns; expected {expected}")
     return rows
+
+
+def _evenly_spaced(content: bytes) -> Array | None:
+    """Return the numbers of lines in which one blank stands between any two; None of any other file, or a wrong one."""
+    from pyarrow import ArrowInvalid, BufferReader, csv, float64
+
+    if content.startswith(b" ") or any(mark in content for mark in (b"  ", b"\n ", b" \n", b" \r", b'"')):
+        return None
+    names = [str(k) for k in range(len(content[: content.find(b"\n")].split()))]
+    try:
+        table = csv.read_csv(
+            BufferReader(content),
+            csv.ReadOptions(column_names=names, use_threads=False),
+            csv.ParseOptions(delimiter=" "),
+            csv.ConvertOptions(column_types=dict.fromkeys(names, float64()), null_values=[]),
+        )
+    except ArrowInvalid:
+        return None
+    return np.column_stack([to_numpy(column) for column in table.columns])
 
 
 def _bad_line(path: Path, content: bytes) -> InputError:

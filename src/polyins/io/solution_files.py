@@ -15,6 +15,7 @@ from polyins.errors import InputError
 from polyins.evaluation.attitude import euler_angles, euler_variance, quaternions
 from polyins.evaluation.summary import plain
 from polyins.geodesy import displacement
+from polyins.io.arrow_arrays import texts_to_arrow, to_arrow, to_numpy
 from polyins.io.files import whole
 from polyins.solution import Innovations, Solution
 
@@ -120,10 +121,10 @@ def _imu_error_columns(solution: Solution) -> dict[str, Any]:
     import pyarrow as pa
 
     epochs, imus, _ = solution.imu_errors.shape
-    index = pa.array(np.tile(np.arange(imus, dtype=np.int32), epochs))
+    index = to_arrow(np.tile(np.arange(imus, dtype=np.int32), epochs))
     return {
         "time_s": np.repeat(solution.imu_error_time, imus),
-        "imu": pa.DictionaryArray.from_arrays(index, pa.array(solution.imu_names, pa.string())),
+        "imu": pa.DictionaryArray.from_arrays(index, texts_to_arrow(solution.imu_names)),
         **_named(IMU_ERROR_COLUMNS, solution.imu_errors.reshape(-1, 12)),
     }
 
@@ -148,13 +149,27 @@ def _write(columns: Mapping[str, Any], metadata: Mapping[str, object], path: Pat
     import pyarrow.parquet as pq
 
     rows = len(columns["time_s"])
-    arrays = {
-        name: pa.nulls(rows, pa.float64()) if values is None else pa.array(values) for name, values in columns.items()
-    }
+    arrays = {name: _arrow(values, rows) for name, values in columns.items()}
     table = pa.table(arrays).replace_schema_metadata({METADATA: json.dumps(plain(metadata))})
     with whole(path) as beside:
-        # Numbers that never repeat gain nothing from a dictionary; the names of IMUs do.
-        pq.write_table(table, beside, compression="zstd", compression_level=1, use_dictionary=["imu"])
+        # Numbers that never repeat gain nothing from a dictionary, but from keeping their like bytes together.
+        numbers = [name for name in table.column_names if name != "imu"]
+        pq.write_table(
+            table,
+            beside,
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=["imu"],
+            use_byte_stream_split=numbers,
+        )
+
+
+def _arrow(values: Any, rows: int) -> pa.Array:
+    import pyarrow as pa
+
+    if values is None:
+        return pa.nulls(rows, pa.float64())
+    return values if isinstance(values, pa.Array) else to_arrow(values)
 
 
 def _read(path: Path) -> tuple[pa.Table, dict[str, Any]]:
@@ -173,7 +188,7 @@ def _read(path: Path) -> tuple[pa.Table, dict[str, Any]]:
 def _column(table: pa.Table, name: str, path: Path) -> Array:
     if name not in table.column_names:
         raise InputError(f"{path}: no column {name}; expected the columns of polyins's {path.name}")
-    return np.array(table.column(name).to_numpy(), dtype=float)
+    return to_numpy(table.column(name))
 
 
 def _table(table: pa.Table, names: tuple[str, ...], path: Path) -> Array:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polyins.errors import InputError
+from polyins.io.arrow_arrays import to_arrow
 from polyins.io.columns import Column, column_names, read_columns
 from polyins.io.files import plain_suffix, write_bytes
 from polyins.io.rows import ImuRows, Source, Track, intervals
@@ -202,7 +203,7 @@ def _write(path: str | Path, names: Sequence[str], values: Sequence[Array]) -> N
     from pyarrow import table as arrow_table
 
     rows = np.column_stack(values)
-    table = arrow_table({name: rows[:, n] for n, name in enumerate(names)})
+    table = arrow_table({name: to_arrow(rows[:, n]) for n, name in enumerate(names)})
     content = BufferOutputStream()
     (parquet.write_table if plain_suffix(path) == ".parquet" else csv.write_csv)(table, content)
     write_bytes(path, content.getvalue().to_pybytes())
