@@ -17,6 +17,15 @@ from polyins.rig import Rig, Vector, zero_vector
 Array = NDArray[np.float64]
 
 
+USUAL_OF = 10_000
+"""Intervals that tell the usual one, however long the recording is."""
+
+
+def usual_interval(time: Array) -> float:
+    """Return the median of the first intervals between stamps, shape (T,), s."""
+    return float(np.median(np.diff(time[: USUAL_OF + 1])))
+
+
 @dataclass(frozen=True)
 class ImuStream:
     """Increments of one IMU in array axes, each over the interval that ends at its time stamp."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
-from polyins.recording import ImuStream
+from polyins.recording import ImuStream, usual_interval
 
 Array = NDArray[np.float64]
 
@@ -33,8 +34,8 @@ class Aligned:
 
     @property
     def rate_hz(self) -> float:
-        """Nominal rate: one over the median interval."""
-        return float(1.0 / np.median(np.diff(self.time)))
+        """Nominal rate: one over the usual interval."""
+        return 1.0 / usual_interval(self.time)
 
     def between(self, begin: float, end: float) -> Aligned:
         """Return the epochs with begin <= time <= end."""
@@ -43,25 +44,28 @@ class Aligned:
         return Aligned(self.time[part], self.increments[part], self.warnings, self.missing[part])
 
 
-def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
+def align(
+    streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Sequence[int] | None = None
+) -> Aligned:
     """Bring the streams onto the time stamps of the first one without gaps, within their common span.
 
     The increments of the others are shared out between its intervals, so that no rotation or velocity is lost or
     counted twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one,
-    the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Raises
-    InputError if less than two seconds are common.
+    the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Where the
+    streams are a part of longer ones, `gap_counts` says how many gaps those have. Raises InputError if less than two
+    seconds are common.
     """
-    time = _common_time(streams)
+    time = _common_time(streams, gap_counts or [len(gaps_of(stream.time)) for stream in streams])
     increments = np.empty((len(time), 6, len(streams)))
     missing = np.zeros((len(time), len(streams)), dtype=bool)
-    warnings = _late(streams)
+    warnings = late_warnings(streams)
     for i, stream in enumerate(streams):
         values = np.hstack([stream.dtheta, stream.dvel])
         if len(stream.time) == len(time) and np.array_equal(stream.time, time):
             increments[:, :, i] = values
         else:
             increments[:, :, i] = _resample(stream.time, values, time)
-        gaps = _gaps(stream.time)
+        gaps = gaps_of(stream.time)
         gaps = [g for g in gaps if g[1] > time[0] and g[0] < time[-1]]
         stops = float(stream.time[-1])
         if time[-1] - stops > LATE:
@@ -79,7 +83,7 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True) -> Aligned:
     return Aligned(time, increments, tuple(warnings), missing)
 
 
-def _late(streams: tuple[ImuStream, ...]) -> list[str]:
+def late_warnings(streams: tuple[ImuStream, ...]) -> list[str]:
     """Say which IMU the others have to wait for."""
     begins = np.array([stream.time[0] for stream in streams])
     latest = int(np.argmax(begins))
@@ -97,7 +101,7 @@ def common_end(ends: Array) -> float:
     return float(ends[ends > ends.max() - LATE].min())
 
 
-def _common_time(streams: tuple[ImuStream, ...]) -> Array:
+def _common_time(streams: tuple[ImuStream, ...], gap_counts: Sequence[int]) -> Array:
     """Return the stamps of the stream with the fewest gaps, filled up in them with those of others.
 
     The time goes on where a stream ends for good while others go on.
@@ -109,12 +113,13 @@ def _common_time(streams: tuple[ImuStream, ...]) -> Array:
         spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
         raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
     # the first whose gaps are few: a gap in the base is one for all
-    ordered = sorted(streams, key=lambda stream: (len(_gaps(stream.time)), stream.time[-1] < end))
+    order = sorted(range(len(streams)), key=lambda i: (gap_counts[i], streams[i].time[-1] < end))
+    ordered = [streams[i] for i in order]
     base: Array = ordered[0].time[(ordered[0].time >= begin) & (ordered[0].time <= end)]
-    nominal = float(np.median(np.diff(base)))
+    nominal = usual_interval(base)
     for stream in ordered[1:]:
         parts = [base]
-        for first, last in [*_gaps(base), *([(base[-1], end + nominal)] if end - base[-1] > GAP * nominal else [])]:
+        for first, last in [*gaps_of(base), *([(base[-1], end + nominal)] if end - base[-1] > GAP * nominal else [])]:
             inside = (stream.time > first + 0.5 * nominal) & (stream.time < last - 0.5 * nominal)
             parts.append(stream.time[inside])
         base = np.sort(np.concatenate(parts))
@@ -126,14 +131,14 @@ def _resample(stamps: Array, values: Array, time: Array) -> Array:
     from polyins.kernels.resample import resample
 
     out = np.empty((len(time), values.shape[1]))
-    before, begin = stamps[0] - np.median(np.diff(stamps)), time[0] - np.median(np.diff(time))
+    before, begin = stamps[0] - usual_interval(stamps), time[0] - usual_interval(time)
     resample(np.ascontiguousarray(stamps), values, before, np.ascontiguousarray(time), begin, out)
     return out
 
 
-def _gaps(stamps: Array) -> list[tuple[float, float]]:
-    intervals = np.diff(stamps)
-    where = np.flatnonzero(intervals > GAP * np.median(intervals))
+def gaps_of(stamps: Array) -> list[tuple[float, float]]:
+    """Return where stamps are missing: the last before and the first after each gap, s."""
+    where = np.flatnonzero(np.diff(stamps) > GAP * usual_interval(stamps))
     return [(float(stamps[k]), float(stamps[k + 1])) for k in where]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.recording import Array
+from polyins.recording import Array, usual_interval
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,6 @@ def without(rows: ImuRows, bad: NDArray[np.bool_]) -> ImuRows:
 
 
 def intervals(time: Array) -> Array:
-    """Return the length of the interval that ends at each stamp, s; the first is taken as the median of the others."""
+    """Return the length of the interval that ends at each stamp, s; the first is taken to be the usual one."""
     steps = np.diff(time)
-    return np.concatenate([[np.median(steps)], steps]) if len(steps) else np.zeros(len(time))
+    return np.concatenate([[usual_interval(time)], steps]) if len(steps) else np.zeros(len(time))
