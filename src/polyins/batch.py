@@ -111,7 +111,7 @@ def run(
             progress(last / epochs)
     if prepared.rolling is not None:
         _check_finite(prepared)
-    return _solution(prepared, filter_s, first_call_s)
+    return solution_of(prepared, filter_s, first_call_s)
 
 
 def _check_finite(run: Prepared) -> None:
@@ -151,13 +151,22 @@ def taken(row: Method, rig: Rig, imu: int = 0) -> list[int]:
 
 
 def lay_out(
-    row: Method, recording: Recording, aligned: Aligned, start: Start, *, dense_covariance: bool = False
+    row: Method,
+    recording: Recording,
+    aligned: Aligned,
+    start: Start,
+    *,
+    dense_covariance: bool = False,
+    end: float | None = None,
 ) -> Prepared:
-    """Lay out the IMUs that a method takes from the epoch at which it starts; the fixes are those of the recording."""
+    """Lay out the IMUs that a method takes from the epoch at which it starts; the fixes are those of the recording.
+
+    `end`: of an array's run, where `aligned` is but its beginning, s.
+    """
     if row.rolling:
         return _lay_out_rolling(row, recording, aligned, start, dense_covariance)
     members = _members(row, recording.rig, start)
-    plan, inputs = build_plan(row, recording, aligned), build_inputs(recording, aligned)
+    plan, inputs = build_plan(row, recording, aligned), build_inputs(recording, aligned, end)
     return Prepared(
         method=row,
         recording=recording,
@@ -344,12 +353,12 @@ def build_plan(row: Method, recording: Recording, aligned: Aligned) -> Plan:
     )
 
 
-def build_inputs(recording: Recording, aligned: Aligned) -> Inputs:
-    """Return the aligned increments and the fixes that the filter is shown."""
+def build_inputs(recording: Recording, aligned: Aligned, end: float | None = None) -> Inputs:
+    """Return the aligned increments and the fixes that the filter is shown, up to `end` or that of the increments."""
     gnss = recording.gnss
     if gnss is None:
         return Inputs(aligned.time, np.ascontiguousarray(aligned.increments), np.empty(0), np.empty((0, 6)), None)
-    shown = (gnss.time > aligned.time[0]) & (gnss.time <= aligned.time[-1])
+    shown = (gnss.time > aligned.time[0]) & (gnss.time <= (aligned.time[-1] if end is None else end))
     for begin, end in recording.outages:
         shown &= ~((gnss.time > begin) & (gnss.time < end))
     velocities = None
@@ -372,7 +381,8 @@ def build_outputs(epochs: int, fixes: int, imus: int, log_every: int, errors: in
     )
 
 
-def _solution(run: Prepared, filter_s: float, first_call_s: float) -> Solution:
+def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0) -> Solution:
+    """Return what a run has written, as a solution."""
     recording, aligned, outputs = run.recording, run.aligned, run.outputs
     states, variances = outputs.states[1:], outputs.variances[1:]
     point = recording.rig.imus[0].position if run.method.bank == "one" else np.zeros(3)

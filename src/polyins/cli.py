@@ -91,9 +91,8 @@ def demo(out: Path) -> None:
 @no_report_option
 def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool) -> None:
     """Run one method over one recording (polyins YAML, or a KF-GINS or Wheel-INS configuration)."""
-    from polyins import batch, results
+    from polyins import batch, loading, results, streaming
     from polyins.evaluation.summary import summarize
-    from polyins.loading import load
     from polyins.methods import find_method
 
     if method is not None:
@@ -101,24 +100,34 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     if imu is not None and method not in (None, "single"):
         raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
     with progress("reading"):
-        recording = load(config)
+        settings = loading.read_config(config)
+        long = streaming.open_long(settings)
+        recording = loading.load_settings(settings) if long is None else long.head
     if imu is not None and recording.rig.rolling:
         raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
     name = method or _usual_method(recording, imu)
     index = _imu_index([one.name for one in recording.rig.imus], imu)
     results.make_folder(out)
     announce_compilation()
-    with progress(name) as update:
-        solution = batch.run(recording, name, imu=index, progress=update)
-    summary = summarize(solution, recording.reference, recording.outages)
-    with progress("writing"):
-        results.write_run(out, recording, solution, summary, report=not no_report)
+    report = not no_report and long is None
+    if long is not None:
+        with progress(name) as update:
+            summary = streaming.run(long, out, name, imu=index, progress=update)
+        results.write_summary(out, recording, summary)
+    else:
+        with progress(name) as update:
+            solution = batch.run(recording, name, imu=index, progress=update)
+        summary = summarize(solution, recording.reference, recording.outages)
+        with progress("writing"):
+            results.write_run(out, recording, solution, summary, report=report)
     if as_json:
         print(results.as_json(summary))
         return
     print_summaries(recording.name, {name: summary}, {})
     say("start: " + ", ".join(f"{key} {value}" for key, value in summary["start"].items()))
-    say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+    if long is not None and not no_report:
+        say(f"report: none is made of a recording with {long.rows} rows of IMU data")
+    say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
 
 
 def _usual_method(recording: Recording, imu: str | None) -> str:

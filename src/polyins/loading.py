@@ -16,8 +16,11 @@ from polyins.io.imu_stream import read_imu
 from polyins.io.position_stream import read_gnss, read_reference
 from polyins.io.timing import outage_intervals, start_options
 from polyins.io.yaml_document import Document, read_yaml, write_yaml
-from polyins.recording import FilterOptions, Offset, Recording, RollingOptions
-from polyins.rig import Rig
+from polyins.recording import FilterOptions, ImuStream, Offset, Recording, RollingOptions
+from polyins.rig import Imu, Rig
+
+Settings = tuple[Config, Document, tuple[str, ...]]
+"""a configuration, the document that says where its keys stand, and warnings"""
 
 NOT_IN_FORCE = {"dataset", "imu_defaults"}
 """keys that the others take in"""
@@ -29,12 +32,17 @@ def load(path: str | Path) -> Recording:
     They are told apart by content. Raises InputError, before anything is computed, for a configuration or data that
     cannot be right.
     """
-    config, document, warnings = read_config(path)
+    return load_settings(read_config(path))
+
+
+def load_settings(settings: Settings) -> Recording:
+    """Read the recording that a configuration describes which is read already; raises InputError as `load` does."""
+    config, document, warnings = settings
     recording = build(config, document)
     return replace(recording, warnings=(*warnings, *recording.warnings))
 
 
-def read_config(path: str | Path) -> tuple[Config, Document, tuple[str, ...]]:
+def read_config(path: str | Path) -> Settings:
     """Read a configuration file; file names in it come out absolute.
 
     Returns the configuration, the document that says where its keys stand, and warnings.
@@ -74,6 +82,21 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
     notes += [clocks.described(offset) for offset in offsets]
     span = checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})
+    recording = assemble(config, document, imus, streams, span, wheels_known)
+    warnings = (*notes, *recording.warnings)
+    return replace(recording, warnings=warnings, clock_offsets=offsets, config_text=in_force(config, offsets))
+
+
+def assemble(
+    config: Config,
+    document: Document,
+    imus: tuple[Imu, ...],
+    streams: tuple[ImuStream, ...],
+    span: tuple[float, float],
+    wheels_known: bool = True,
+) -> Recording:
+    """Read what a configuration names beside the IMUs, whose data cover `span`, and put all together."""
+    notes: list[str] = []
     gnss = reference = geodetic = None
     if config.gnss:
         gnss, geodetic, texts = read_gnss(config.gnss, document, span)
@@ -99,13 +122,11 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
         start=start,
         options=_filter_options(config),
         name=config.name,
-        config_text=_in_force(config, offsets),
         warnings=(*notes, *texts),
-        clock_offsets=offsets,
     )
 
 
-def _in_force(config: Config, offsets: tuple[Offset, ...]) -> str:
+def in_force(config: Config, offsets: tuple[Offset, ...] = ()) -> str:
     """Return the configuration as YAML, with the clock offsets that were found in the place of those to be found."""
     found = {offset.name: offset.offset_s for offset in offsets}
     imus = tuple(

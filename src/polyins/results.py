@@ -38,13 +38,18 @@ def write_document(path: Path, document: Document) -> None:
 def write_run(folder: Path, recording: Recording, solution: Solution, summary: Document, report: bool = True) -> None:
     """Write solution, summary, configuration and report of one run."""
     write_solution(solution, folder)
-    write_document(folder / "summary.json", summary)
-    _write_config(folder, recording)
-    (folder / "report.html").unlink(missing_ok=True)  # of an earlier run
+    write_summary(folder, recording, summary)
     if report:
         from polyins.report.page import write_report
 
         write_report(folder / "report.html", {solution.method: (solution, dict(summary))}, recording)
+
+
+def write_summary(folder: Path, recording: Recording, summary: Document) -> None:
+    """Write summary and configuration of a run, and take away the report of an earlier one."""
+    write_document(folder / "summary.json", summary)
+    _write_config(folder, recording)
+    (folder / "report.html").unlink(missing_ok=True)
 
 
 def write_comparison(folder: Path, recording: Recording, result: Comparison, report: bool = True) -> None:
@@ -65,9 +70,7 @@ def write_comparison(folder: Path, recording: Recording, result: Comparison, rep
         for (name, solution), summary in zip(result.each.items(), summaries[alone]["each"], strict=True):
             write_solution(solution, folder / alone / name)
             write_document(folder / alone / name / "summary.json", summary)
-    write_document(folder / "summary.json", result.document)
-    _write_config(folder, recording)
-    (folder / "report.html").unlink(missing_ok=True)  # of an earlier run
+    write_summary(folder, recording, result.document)
     if report:
         from polyins.report.page import write_report
 

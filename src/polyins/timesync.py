@@ -44,9 +44,7 @@ class Aligned:
         return Aligned(self.time[part], self.increments[part], self.warnings, self.missing[part])
 
 
-def align(
-    streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Sequence[int] | None = None
-) -> Aligned:
+def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Sequence[int] | None = None) -> Aligned:
     """Bring the streams onto the time stamps of the first one without gaps, within their common span.
 
     The increments of the others are shared out between its intervals, so that no rotation or velocity is lost or
@@ -73,9 +71,7 @@ def align(
         for begin, end in gaps:
             missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
         if gaps:
-            begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
-            count = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
-            warnings.append(f"IMU {stream.name}: {count} of {end - begin:.3f} s at {begin:.3f} s")
+            warnings.append(gap_warning(stream.name, gaps))
     if bridge and missing.any():
         _bridge(time, increments, missing)
     else:
@@ -136,10 +132,20 @@ def _resample(stamps: Array, values: Array, time: Array) -> Array:
     return out
 
 
-def gaps_of(stamps: Array) -> list[tuple[float, float]]:
-    """Return where stamps are missing: the last before and the first after each gap, s."""
-    where = np.flatnonzero(np.diff(stamps) > GAP * usual_interval(stamps))
+def gaps_of(stamps: Array, usual: float | None = None) -> list[tuple[float, float]]:
+    """Return where stamps are missing: the last before and the first after each gap, s.
+
+    `usual`: the usual interval, where `stamps` are a part of more.
+    """
+    where = np.flatnonzero(np.diff(stamps) > GAP * (usual_interval(stamps) if usual is None else usual))
     return [(float(stamps[k]), float(stamps[k + 1])) for k in where]
+
+
+def gap_warning(name: str, gaps: Sequence[tuple[float, float]]) -> str:
+    """Say how many gaps an IMU has and where the longest is."""
+    begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
+    count = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
+    return f"IMU {name}: {count} of {end - begin:.3f} s at {begin:.3f} s"
 
 
 def _bridge(time: Array, increments: Array, missing: NDArray[np.bool_]) -> None:

@@ -99,7 +99,7 @@ def compare_to_reference(solution: Solution, reference: Reference) -> Errors:
     attitude_error = None
     if reference.attitude is not None:
         attitude_error = wrap(euler_angles(attitude) - place.interpolate(reference.attitude, np.full(3, True)))
-    travelled = np.interp(time, reference.time, _path_length(reference.position, solution.geodetic))
+    travelled = np.interp(time, reference.time, path_length(reference.position, solution.geodetic))
     return Errors(time, position, velocity, attitude_error, travelled - travelled[:1], place.covered)
 
 
@@ -112,7 +112,7 @@ def _lever_arm_velocity(solution: Solution, lever_arm: Vector) -> Array:
     return np.asarray((rotation_matrices(solution.attitude) @ around[..., None])[..., 0], dtype=float)
 
 
-def _path_length(position: Array, geodetic: bool) -> Array:
+def path_length(position: Array, geodetic: bool) -> Array:
     """Return the metres travelled over ground up to each position, shape (R,)."""
     step = np.diff(position, axis=0)
     if geodetic:

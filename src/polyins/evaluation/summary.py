@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,28 +39,73 @@ def summarize(solution: Solution, reference: Reference | None, outages: Sequence
     Raises InputError if the reference cannot be compared with.
     """
     errors = None if reference is None else compare_to_reference(solution, reference)
-    epochs = solution.time.size
-    document = {
+    figures = NO_FIGURES if errors is None else errors.statistics()
+    return document(solution, Extent.of(solution, errors), errors, figures, consistency(solution, errors), outages)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How long a solution is, and how much of it is good."""
+
+    first: float
+    """s"""
+    last: float
+    """s"""
+    epochs: int
+    interval: float
+    """median, s"""
+    broken: int
+    """epochs that are not finite"""
+    uncovered: int
+    """epochs without reference"""
+
+    @classmethod
+    def of(cls, solution: Solution, errors: Errors | None) -> Extent:
+        """Count the epochs of a whole solution."""
+        time = solution.time
+        return cls(
+            first=float(time[0]) if time.size else 0.0,
+            last=float(time[-1]) if time.size else 0.0,
+            epochs=time.size,
+            interval=float(np.median(np.diff(time))) if time.size > 1 else np.nan,
+            broken=int(np.count_nonzero(~np.isfinite(solution.position).all(axis=1))),
+            uncovered=0 if errors is None else errors.epochs_without_reference,
+        )
+
+
+def document(
+    solution: Solution,
+    extent: Extent,
+    errors: Errors | None,
+    figures: Mapping[str, float | None],
+    consistent: Mapping[str, float | None],
+    outages: Sequence[Interval],
+) -> Document:
+    """Return the `run` document from its parts; of the solution only what has no row per epoch is looked at.
+
+    `errors` are those of all epochs, or of the ones that outage statistic and drift come from.
+    """
+    whole = {
         "polyins": __version__,
         "method": solution.method,
         "imus": solution.imus,
-        "rate_hz": round(1.0 / float(np.median(np.diff(solution.time))), 6) if epochs > 1 else None,
-        "duration_s": solution.time[-1] - solution.time[0] if epochs else 0.0,
-        "epochs": epochs,
+        "rate_hz": round(1.0 / extent.interval, 6),
+        "duration_s": extent.last - extent.first,
+        "epochs": extent.epochs,
         "filter_s": solution.filter_s,
-        "us_per_epoch": 1e6 * solution.filter_s / epochs if epochs else None,
+        "us_per_epoch": 1e6 * solution.filter_s / extent.epochs if extent.epochs else None,
         "first_call_s": solution.first_call_s,
-        "reference": NO_FIGURES if errors is None else errors.statistics(),
+        "reference": figures,
         "outages": outage_statistic(errors, outages),
         "drift": drift(errors),
-        "consistency": consistency(solution, errors),
+        "consistency": consistent,
         "gnss": _gnss(solution.innovations),
         "start": solution.start,
         "faults": list(solution.faults),
         "mounting": _mounting(solution),
-        "warnings": [*solution.warnings, *_warnings(solution, errors, outages)],
+        "warnings": [*solution.warnings, *_warnings(extent, errors, outages)],
     }
-    return {key: plain(value) for key, value in document.items()}
+    return {key: plain(value) for key, value in whole.items()}
 
 
 def comparison(summaries: Mapping[str, Document], each: Sequence[Document], alone: str = "single") -> Document:
@@ -159,24 +205,23 @@ def _mounting(solution: Solution) -> Document:
     }
 
 
-def _warnings(solution: Solution, errors: Errors | None, outages: Sequence[Interval]) -> list[str]:
+def _warnings(extent: Extent, errors: Errors | None, outages: Sequence[Interval]) -> list[str]:
     found = []
-    broken = np.count_nonzero(~np.isfinite(solution.position).all(axis=1))
-    if broken:
-        found.append(f"the solution is not finite at {broken} of {solution.time.size} epochs: it diverged")
+    if extent.broken:
+        found.append(f"the solution is not finite at {extent.broken} of {extent.epochs} epochs: it diverged")
     if errors is not None:
-        found.extend(_coverage_warnings(solution, errors, outages))
+        found.extend(_coverage_warnings(extent, errors, outages))
     return found
 
 
-def _coverage_warnings(solution: Solution, errors: Errors, outages: Sequence[Interval]) -> list[str]:
+def _coverage_warnings(extent: Extent, errors: Errors, outages: Sequence[Interval]) -> list[str]:
     found = []
-    share = errors.epochs_without_reference / max(solution.time.size, 1)
+    share = extent.uncovered / max(extent.epochs, 1)
     # streams hardly ever begin and end together
-    if share > NEGLIGIBLE_SHARE and share * np.ptp(solution.time) >= NEGLIGIBLE_S:
+    if share > NEGLIGIBLE_SHARE and share * (extent.last - extent.first) >= NEGLIGIBLE_S:
         found.append(
-            f"reference: covers {errors.time.size} of {errors.covered.size} epochs; "
-            f"{errors.epochs_without_reference} are left out of the errors"
+            f"reference: covers {extent.epochs - extent.uncovered} of {extent.epochs} epochs; "
+            f"{extent.uncovered} are left out of the errors"
         )
     found.extend(
         f"outage {begin:.3f} s to {end:.3f} s: solution and reference do not cover all of it; its maximum may be larger"

@@ -49,8 +49,8 @@ def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m:
     """
     if len(rows.time) < 2:
         raise InputError(f"{rows.source.path}: {len(rows.time)} row(s); expected at least 2")
-    _check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel})
-    _check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
+    check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel})
+    check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
     _check_rate(rows)
     _check_accel_unit(rows, off_axis_m)
     rate = _check_gyro_unit(rows, max_rate_rad_s)
@@ -118,13 +118,13 @@ def check_track(track: Track, what: str) -> tuple[str, ...]:
     """
     if not len(track.time):
         raise InputError(f"{track.source.path}: no rows; expected positions for {what}")
-    _check_finite(track.source, {"time": track.time, "position": track.position})
+    check_finite(track.source, {"time": track.time, "position": track.position})
     angles = track.attitude
     if angles is not None and np.isnan(angles[:, :2]).all():  # of a reference with heading alone
         angles = angles[:, 2:]
     optional = {"velocity": track.velocity, "velocity std": track.velocity_std, "attitude": angles}
-    _check_finite(track.source, {name: block for name, block in optional.items() if block is not None})
-    _check_order(track.source, track.time, "")
+    check_finite(track.source, {name: block for name, block in optional.items() if block is not None})
+    check_order(track.source, track.time)
     if track.geodetic:
         _check_coordinates(track)
     return track.warnings
@@ -132,7 +132,7 @@ def check_track(track: Track, what: str) -> tuple[str, ...]:
 
 def check_std(source: Source, std: Array) -> None:
     """Raise InputError for standard deviations of a position that are not positive metres."""
-    _check_finite(source, {"position std": std})
+    check_finite(source, {"position std": std})
     for row in np.flatnonzero((std <= 0.0).any(axis=1))[:1]:
         raise InputError(
             f"{source.place(int(row))}: position std is {std[row].tolist()} m; expected numbers above zero "
@@ -174,26 +174,32 @@ def check_within(source: Source, what: str, time: Array, span: tuple[float, floa
     return (f"{source.path}: {count} of {len(time)} {what} rows lie outside the IMUs' span and are not used",)
 
 
-def _check_finite(source: Source, blocks: dict[str, Array]) -> None:
+def check_finite(source: Source, blocks: dict[str, Array], first_row: int = 0) -> None:
+    """Raise InputError for the first row, in blocks of shape (T,) or (T, k) by name, that is not all numbers.
+
+    `first_row`: of the blocks in the file.
+    """
     for name, block in blocks.items():
         bad = ~np.isfinite(block)
         for row in np.flatnonzero(bad if block.ndim == 1 else bad.any(axis=1))[:1]:
-            raise InputError(f"{source.place(int(row))}: {name} is missing or not a number; expected a number")
+            place = source.place(first_row + int(row))
+            raise InputError(f"{place}: {name} is missing or not a number; expected a number")
 
 
-def _check_order(source: Source, time: Array, remedy: str) -> None:
+def check_order(source: Source, time: Array, remedy: str = "", first_row: int = 0) -> None:
+    """Raise InputError for stamps, shape (T,), that do not increase; `remedy` ends the message."""
     steps = np.diff(time)
     if np.all(steps > 0.0):
         return
     row = int(np.argmax(steps <= 0.0)) + 1
+    place = source.place(first_row + row)
     if steps[row - 1] == 0.0:
         count = int(np.sum(steps == 0.0))
         raise InputError(
-            f"{source.place(row)}: time {time[row]:.6f} s is repeated ({count} in the file); expected increasing "
-            f"times{remedy}"
+            f"{place}: time {time[row]:.6f} s is repeated ({count} in the file); expected increasing times{remedy}"
         )
     raise InputError(
-        f"{source.place(row)}: time {time[row]:.6f} s follows {time[row - 1]:.6f} s; expected increasing times{remedy}"
+        f"{place}: time {time[row]:.6f} s follows {time[row - 1]:.6f} s; expected increasing times{remedy}"
     )
 
 

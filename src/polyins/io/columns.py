@@ -165,6 +165,17 @@ def _numbers(path: Path, table: Layout, place: int, cells: Any, text_is_nan: boo
     return values
 
 
+def parquet_places(path: str | Path, wanted: Sequence[Column]) -> list[str]:
+    """Return the names of the wanted columns of a Parquet file; raise InputError for one that is missing."""
+    from pyarrow import ArrowException, parquet
+
+    try:
+        names = parquet.read_schema(path).names
+    except (ArrowException, OSError) as error:
+        raise InputError(f"{path}: is not a whole Parquet file ({str(error).splitlines()[0]})") from error
+    return [names[_place(Path(path), names, column)] for column in wanted]
+
+
 def _parquet_names(path: str | Path, content: bytes) -> tuple[str, ...]:
     from pyarrow import ArrowException, BufferReader, parquet
 

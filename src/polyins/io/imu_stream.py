@@ -37,25 +37,34 @@ def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuS
     rows, faults = without_faults(rows, entry.name, entry.clock_offset_s)
     range_known = (entry.gyro_range_deg_s or rows.gyro_range_deg_s) is not None
     warnings += (*faults, *clipped(rows, entry.name, entry.clock_offset_s, gyro=not range_known))
-    rotation = sensor_rotation(entry)
-    time = rows.time + entry.clock_offset_s
-    stream = ImuStream(entry.name, time, _turned(rotation, rows.dtheta), _turned(rotation, rows.dvel))
+    stream = in_array_axes(rows, entry)
     if entry.wheel is None:
         place = document.place(["imus", index, "axes"])
-        checks.check_upright(entry.name, place, entry.axes, time, stream.dvel)
+        checks.check_upright(entry.name, place, entry.axes, stream.time, stream.dvel)
     with document.at(["imus", index]):
-        imu = Imu(
-            entry.name,
-            noise_grade(entry.noise),
-            rotation,
-            np.array(entry.position_m),
-            _initial_errors(entry.initial_errors),
-            _initial_std(entry.initial_std, noise_grade(entry.noise)),
-            wheel=None if entry.wheel is None else wheel(entry.wheel),
-            module=entry.module,
-            mount_std=entry.mount_std_deg * DEG,
-        )
-    return imu, stream, warnings
+        return as_mounted(entry), stream, warnings
+
+
+def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
+    """Return rows as increments in array axes, on a wheel in the module's, on the recording's clock."""
+    rotation = sensor_rotation(entry)
+    dtheta, dvel = _turned(rotation, rows.dtheta), _turned(rotation, rows.dvel)
+    return ImuStream(entry.name, rows.time + entry.clock_offset_s, dtheta, dvel)
+
+
+def as_mounted(entry: ImuEntry) -> Imu:
+    """Return what a configuration says of an IMU."""
+    return Imu(
+        entry.name,
+        noise_grade(entry.noise),
+        sensor_rotation(entry),
+        np.array(entry.position_m),
+        _initial_errors(entry.initial_errors),
+        _initial_std(entry.initial_std, noise_grade(entry.noise)),
+        wheel=None if entry.wheel is None else wheel(entry.wheel),
+        module=entry.module,
+        mount_std=entry.mount_std_deg * DEG,
+    )
 
 
 def _rows(entry: ImuEntry, place: str) -> ImuRows:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,9 +45,39 @@ _PHI_STD = tuple(f"std_phi_{axis}_deg" for axis in _AXES)
 
 def write_solution(solution: Solution, folder: Path) -> None:
     """Write `solution.parquet` and `imu_errors.parquet` into `folder`, which is made if there is none."""
-    folder.mkdir(parents=True, exist_ok=True)
-    _write(_columns(solution), _metadata(solution), folder / SOLUTION)
-    _write(_imu_error_columns(solution), {"polyins": __version__}, folder / IMU_ERRORS)
+    with SolutionWriter(folder) as writer:
+        writer.add(solution)
+        writer.finish(solution)
+
+
+class SolutionWriter:
+    """The two files of a solution, written part by part; they take their names when the block ends without an error."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._stack = ExitStack()
+        self._files = [_Table(self._stack, folder / SOLUTION), _Table(self._stack, folder / IMU_ERRORS)]
+        self._origin: Array | None = None
+
+    def __enter__(self) -> SolutionWriter:
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        self._stack.__exit__(*raised)
+
+    def add(self, part: Solution) -> None:
+        """Write the epochs of a part, which follows the one before."""
+        self._origin = part.position[0] if self._origin is None else self._origin
+        trajectory, errors = self._files
+        trajectory.add(_columns(part, self._origin))
+        errors.add(_imu_error_columns(part))
+
+    def finish(self, solution: Solution) -> None:
+        """Write what is known of the whole solution: of it only what has no row per epoch is looked at."""
+        assert self._origin is not None
+        trajectory, errors = self._files
+        trajectory.finish(_metadata(solution, self._origin))
+        errors.finish({"polyins": __version__})
 
 
 def read_solution(path: Path) -> Solution:
@@ -90,13 +121,13 @@ def read_solution(path: Path) -> Solution:
     )
 
 
-def _columns(solution: Solution) -> dict[str, Array | None]:
+def _columns(solution: Solution, origin: Array) -> dict[str, Array | None]:
     euler = euler_angles(solution.attitude)
     euler_std = np.degrees(np.sqrt(euler_variance(euler, solution.phi_covariance)))
     degrees = np.degrees(euler)
     degrees[:, 2] %= 360.0
     latitude, longitude = np.degrees(solution.position[:, :2]).T if solution.geodetic else (None, None)
-    local = displacement(solution.position, solution.position[0], solution.geodetic)
+    local = displacement(solution.position, origin, solution.geodetic)
     phi_std = np.degrees(np.sqrt(solution.phi_covariance[:, [0, 3, 5]]))
     return {
         "time_s": solution.time,
@@ -129,12 +160,12 @@ def _imu_error_columns(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _metadata(solution: Solution) -> dict[str, object]:
+def _metadata(solution: Solution, origin: Array) -> dict[str, object]:
     return {
         "polyins": __version__,
         "method": solution.method,
         "point": solution.point,
-        "origin": solution.position[0],
+        "origin": origin,
         "imus": solution.imus,
         "imu_names": solution.imu_names,
         "start": solution.start,
@@ -144,24 +175,40 @@ def _metadata(solution: Solution) -> dict[str, object]:
     }
 
 
-def _write(columns: Mapping[str, Any], metadata: Mapping[str, object], path: Path) -> None:
-    import pyarrow as pa
+class _Table:
+    """A Parquet file that grows by row groups."""
+
+    def __init__(self, stack: ExitStack, path: Path) -> None:
+        self._stack = stack
+        self._beside = stack.enter_context(whole(path))
+        self._writer: Any = None
+
+    def add(self, columns: Mapping[str, Any]) -> None:
+        import pyarrow as pa
+
+        rows = len(columns["time_s"])
+        table = pa.table({name: _arrow(values, rows) for name, values in columns.items()})
+        if self._writer is None:
+            self._writer = self._stack.enter_context(_parquet_writer(self._beside, table.schema))
+        self._writer.write_table(table)
+
+    def finish(self, metadata: Mapping[str, object]) -> None:
+        self._writer.add_key_value_metadata({METADATA: json.dumps(plain(metadata))})
+
+
+def _parquet_writer(path: Path, schema: pa.Schema) -> Any:
     import pyarrow.parquet as pq
 
-    rows = len(columns["time_s"])
-    arrays = {name: _arrow(values, rows) for name, values in columns.items()}
-    table = pa.table(arrays).replace_schema_metadata({METADATA: json.dumps(plain(metadata))})
-    with whole(path) as beside:
-        # Numbers that never repeat gain nothing from a dictionary, but from keeping their like bytes together.
-        numbers = [name for name in table.column_names if name != "imu"]
-        pq.write_table(
-            table,
-            beside,
-            compression="zstd",
-            compression_level=1,
-            use_dictionary=["imu"],
-            use_byte_stream_split=numbers,
-        )
+    # Numbers that never repeat gain nothing from a dictionary, but from keeping their like bytes together.
+    numbers = [name for name in schema.names if name != "imu"]
+    return pq.ParquetWriter(
+        path,
+        schema,
+        compression="zstd",
+        compression_level=1,
+        use_dictionary=["imu"],
+        use_byte_stream_split=numbers,
+    )
 
 
 def _arrow(values: Any, rows: int) -> pa.Array:
@@ -179,10 +226,10 @@ def _read(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     if not path.is_file():
         raise InputError(f"{path}: no such file; expected a Parquet file or a folder with {SOLUTION}")
     try:
-        table = pq.read_table(path)
+        table, metadata = pq.read_table(path), pq.read_metadata(path).metadata
     except (pa.ArrowException, OSError) as error:
         raise InputError(f"{path}: not readable as Parquet ({error})") from None
-    return table, json.loads((table.schema.metadata or {}).get(METADATA, b"{}"))
+    return table, json.loads((metadata or {}).get(METADATA, b"{}"))
 
 
 def _column(table: pa.Table, name: str, path: Path) -> Array:

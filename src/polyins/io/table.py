@@ -41,27 +41,48 @@ def read_imu(path: str | Path, columns: ImuColumns | None = None, rate_hz: float
     / rate and the stamps are ignored. Raises InputError for missing columns and cells that are not numbers.
     """
     if columns is None:
-        source, values = read_columns(path, IMU_NAMES)
-        time = np.arange(len(values[0])) / rate_hz if rate_hz else values[0]
-        return ImuRows(source, time, np.column_stack(values[1:4]), np.column_stack(values[4:7]))
+        columns = written_imu_columns()
     if columns.time is None and rate_hz is None:
         raise InputError(f"{path}: neither columns.time nor rate_hz is given; expected one of them")
+    source, values = read_columns(path, imu_cells(columns, rate_hz))
+    return imu_rows(source, values, columns, rate_hz)
+
+
+def written_imu_columns() -> ImuColumns:
+    """Return the columns of an IMU table that polyins wrote."""
+    from polyins.config import ImuColumns
+
+    gyro = {"names": IMU_NAMES[1:4], "unit": "rad"}
+    accel = {"names": IMU_NAMES[4:7], "unit": "m/s"}
+    return ImuColumns.model_validate({"time": {"name": IMU_NAMES[0]}, "gyro": gyro, "accel": accel})
+
+
+def imu_cells(columns: ImuColumns, rate_hz: float | None = None) -> list[Column]:
+    """Return which columns of an IMU table are read: gyro, accelerometer, and the stamps unless `rate_hz` is given."""
     stamp: list[Column] = [] if rate_hz or columns.time is None else [columns.time.name]
-    source, values = read_columns(path, [*columns.gyro.names, *columns.accel.names, *stamp])
+    return [*columns.gyro.names, *columns.accel.names, *stamp]
+
+
+def imu_rows(source: Source, values: Sequence[Array], columns: ImuColumns, rate_hz: float | None = None) -> ImuRows:
+    """Return the rows of an IMU table from the values of `imu_cells`, each of shape (T,)."""
     if rate_hz or columns.time is None:
         time = np.arange(len(values[0])) / (rate_hz or 1.0)
     else:
         time = values[6] * SECONDS[columns.time.unit]
     gyro, accel = columns.gyro.unit, columns.accel.unit
-    steps = intervals(time)[:, None]
-    return ImuRows(
-        source,
-        time,
-        np.column_stack(values[:3]) * RADIANS[gyro] * (steps if gyro.endswith("/s") else 1.0),
-        np.column_stack(values[3:6]) * METRES[accel] * (1.0 if accel == "m/s" else steps),
-        gyro_unit=gyro,
-        accel_unit=accel,
-    )
+    dtheta = _increments(values[:3], RADIANS[gyro], time if gyro.endswith("/s") else None)
+    dvel = _increments(values[3:6], METRES[accel], None if accel == "m/s" else time)
+    return ImuRows(source, time, dtheta, dvel, gyro_unit=gyro, accel_unit=accel)
+
+
+def _increments(values: Sequence[Array], unit: float, time: Array | None) -> Array:
+    """Return three columns in SI, shape (T, 3), times the intervals of `time` where they are rates."""
+    rows = np.column_stack(values)
+    if unit != 1.0:
+        rows *= unit
+    if time is not None:
+        rows *= intervals(time)[:, None]
+    return rows
 
 
 def read_track(path: str | Path, columns: TrackColumns | None = None) -> Track:
