@@ -35,7 +35,7 @@ from polyins.solution import Innovations, Solution
 from polyins.timesync import Aligned
 
 STRETCH_S = 60.0
-HEAD_S = 600.0
+HEAD_S = 300.0
 """the beginning, from which units and axes are checked and the start is found"""
 MARGIN_S = 3.0
 """by which the stretches overlap while they are aligned"""
@@ -180,7 +180,22 @@ def _lay_out(row: Method, recording: LongRecording) -> tuple[Prepared, float]:
         )
     start = alignment.find_start(head, aligned)
     end = last if head.start.end_time is None else min(last, head.start.end_time)
-    return batch.lay_out(row, head, aligned.between(start.time, np.inf), start, end=end), end
+    return _light(batch.lay_out(row, head, aligned.between(start.time, np.inf), start, end=end)), end
+
+
+def _light(run: Prepared) -> Prepared:
+    """Return a run without the data of the beginning, which are not to be held until the end."""
+    none = np.empty(0)
+    streams = tuple(ImuStream(stream.name, none, none, none) for stream in run.recording.imus)
+    first = _part(run.aligned, slice(0, 1))
+    outputs = batch.build_outputs(1, 0, run.outputs.log.shape[3], 1, run.outputs.log.shape[2])
+    return replace(
+        run,
+        recording=replace(run.recording, imus=streams),
+        aligned=first,
+        inputs=run.inputs._replace(time=first.time, increments=first.increments),
+        outputs=outputs._replace(fix_status=run.outputs.fix_status, innovations=run.outputs.innovations),
+    )
 
 
 def _gap_counts(recording: LongRecording) -> list[int]:
@@ -236,7 +251,8 @@ def _joined(first: Aligned, second: Aligned) -> Aligned:
 
 
 def _part(aligned: Aligned, part: slice) -> Aligned:
-    return Aligned(aligned.time[part], aligned.increments[part], (), aligned.missing[part])
+    # copies: a view would hold the whole
+    return Aligned(aligned.time[part].copy(), aligned.increments[part].copy(), (), aligned.missing[part].copy())
 
 
 def _navigate(run: Prepared, stretch: Aligned) -> Solution:

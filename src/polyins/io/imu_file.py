@@ -113,15 +113,16 @@ class Reel:
             self._held = more if self._held is None else _joined(self._held, more)
         assert self._held is not None
         stretch = _part(self._held, None, int(np.searchsorted(self._held.time, end, "right")))
-        self._held = _part(self._held, int(np.searchsorted(self._held.time, keep_from)), None)
+        kept = _part(self._held, int(np.searchsorted(self._held.time, keep_from)), None)
+        self._held = _joined(kept)  # a copy: a part would hold the whole
         return stretch
 
 
-def _joined(first: ImuStream, second: ImuStream) -> ImuStream:
-    def both(name: str) -> Any:
-        return np.concatenate([getattr(first, name), getattr(second, name)])
+def _joined(*parts: ImuStream) -> ImuStream:
+    def whole(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
 
-    return ImuStream(first.name, both("time"), both("dtheta"), both("dvel"))
+    return ImuStream(parts[0].name, whole("time"), whole("dtheta"), whole("dvel"))
 
 
 def _part(stream: ImuStream, first: int | None, last: int | None) -> ImuStream:
