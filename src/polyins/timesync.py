@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 LATE = 1.0
 """s: an IMU that begins so long after the others is waited for, one that ends so long before them is not"""
 
+BLOCK = 512
+"""epochs interleaved at once: what is written stays in the cache until all streams have had their turn"""
+
 GAP = 3.5
 """An interval longer than this many nominal ones is a gap: what was measured in it is lost."""
 
@@ -54,15 +57,15 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Seque
     seconds are common.
     """
     time = _common_time(streams, gap_counts or [len(gaps_of(stream.time)) for stream in streams])
-    increments = np.empty((len(time), 6, len(streams)))
+    on_base: list[tuple[Array, Array]] = []
     missing = np.zeros((len(time), len(streams)), dtype=bool)
     warnings = late_warnings(streams)
     for i, stream in enumerate(streams):
-        values = np.hstack([stream.dtheta, stream.dvel])
         if len(stream.time) == len(time) and np.array_equal(stream.time, time):
-            increments[:, :, i] = values
+            on_base.append((stream.dtheta, stream.dvel))
         else:
-            increments[:, :, i] = _resample(stream.time, values, time)
+            values = _resample(stream.time, np.hstack([stream.dtheta, stream.dvel]), time)
+            on_base.append((values[:, :3], values[:, 3:]))
         gaps = gaps_of(stream.time)
         gaps = [g for g in gaps if g[1] > time[0] and g[0] < time[-1]]
         stops = float(stream.time[-1])
@@ -72,6 +75,7 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Seque
             missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
         if gaps:
             warnings.append(gap_warning(stream.name, gaps))
+    increments = _interleaved(on_base, len(time))
     if bridge and missing.any():
         _bridge(time, increments, missing)
     else:
@@ -97,6 +101,17 @@ def common_end(ends: Array) -> float:
     return float(ends[ends > ends.max() - LATE].min())
 
 
+def _interleaved(streams: Sequence[tuple[Array, Array]], epochs: int) -> Array:
+    """Return the increments of all streams side by side, shape (T, 6, N)."""
+    increments = np.empty((epochs, 6, len(streams)))
+    for first in range(0, epochs, BLOCK):
+        rows = slice(first, first + BLOCK)
+        for i, (dtheta, dvel) in enumerate(streams):
+            increments[rows, :3, i] = dtheta[rows]
+            increments[rows, 3:, i] = dvel[rows]
+    return increments
+
+
 def _common_time(streams: tuple[ImuStream, ...], gap_counts: Sequence[int]) -> Array:
     """Return the stamps of the stream with the fewest gaps, filled up in them with those of others.
 
@@ -118,7 +133,8 @@ def _common_time(streams: tuple[ImuStream, ...], gap_counts: Sequence[int]) -> A
         for first, last in [*gaps_of(base), *([(base[-1], end + nominal)] if end - base[-1] > GAP * nominal else [])]:
             inside = (stream.time > first + 0.5 * nominal) & (stream.time < last - 0.5 * nominal)
             parts.append(stream.time[inside])
-        base = np.sort(np.concatenate(parts))
+        if any(map(len, parts[1:])):
+            base = np.sort(np.concatenate(parts))
     return base
 
 

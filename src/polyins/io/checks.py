@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.io.rows import ImuRows, Source, Track
-from polyins.recording import Array
+from polyins.recording import Array, usual_interval
 from polyins.timesync import common_end
 
 Axes = tuple[str, str, str]
@@ -180,7 +180,10 @@ def check_finite(source: Source, blocks: dict[str, Array], first_row: int = 0) -
     `first_row`: of the blocks in the file.
     """
     for name, block in blocks.items():
-        bad = ~np.isfinite(block)
+        good = np.isfinite(block)
+        if good.all():
+            continue
+        bad = ~good
         for row in np.flatnonzero(bad if block.ndim == 1 else bad.any(axis=1))[:1]:
             place = source.place(first_row + int(row))
             raise InputError(f"{place}: {name} is missing or not a number; expected a number")
@@ -204,7 +207,7 @@ def check_order(source: Source, time: Array, remedy: str = "", first_row: int = 
 
 
 def _check_rate(rows: ImuRows) -> None:
-    rate = float(1.0 / np.median(np.diff(rows.time)))
+    rate = 1.0 / usual_interval(rows.time)
     if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
         raise InputError(
             f"{rows.source.path}: {rate:.4g} rows per second of the stamps; expected {RATES_HZ[0]:g} to "
@@ -213,9 +216,9 @@ def _check_rate(rows: ImuRows) -> None:
 
 
 def _check_accel_unit(rows: ImuRows, off_axis_m: float) -> None:
-    step = float(np.median(np.diff(rows.time)))
-    size = float(np.median(np.linalg.norm(rows.dvel, axis=1))) / step
-    spin = float(np.median(np.linalg.norm(rows.dtheta, axis=1))) / step
+    step = usual_interval(rows.time)
+    size = float(np.median(_sizes(rows.dvel))) / step
+    spin = float(np.median(_sizes(rows.dtheta))) / step if off_axis_m else 0.0
     if GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1] + off_axis_m * spin**2:
         return
     unit, said = rows.accel_unit, f"the specific force comes out at {size:.4g} m/s^2"
@@ -234,13 +237,19 @@ def _check_accel_unit(rows: ImuRows, off_axis_m: float) -> None:
     raise InputError(f"{rows.source.path}: with unit {unit} {said}; expected about 9.8. {hint}")
 
 
+def _sizes(vectors: Array) -> Array:
+    """Return the length of each vector of shape (T, 3)."""
+    x, y, z = vectors.T
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
 def _like_gravity(size: float) -> bool:
     return GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1]
 
 
 def _check_gyro_unit(rows: ImuRows, max_rate: float) -> float:
     """Return the rms turn rate, rad/s."""
-    turn = np.linalg.norm(rows.dtheta[1:], axis=1)
+    turn = _sizes(rows.dtheta[1:])
     rms = float(np.sqrt(np.mean((turn / np.diff(rows.time)) ** 2)))
     largest = int(np.argmax(turn))
     on_wheel = max_rate > MAX_RATE_RAD_S
@@ -271,7 +280,7 @@ def _check_coordinates(track: Track) -> None:
 def _uneven(time: Array) -> list[str]:
     """Describe gaps and jitter of a stream."""
     steps = np.diff(time)
-    usual = float(np.median(steps))
+    usual = usual_interval(time)
     gaps = steps > GAP_INTERVALS * usual
     texts = []
     if gaps.any():

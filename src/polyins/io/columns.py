@@ -13,7 +13,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.io.arrow_arrays import to_numpy
-from polyins.io.files import find, read_bytes
+from polyins.io.files import find, read_bytes, read_head
 from polyins.io.rows import Source
 from polyins.recording import Array
 
@@ -48,9 +48,11 @@ def read_columns(
     `header_has`: a name by which the header line is known where other lines come before it. `text_is_nan`: cells that
     are not numbers are NaN instead of an error. Raises InputError that names the missing column or the bad line.
     """
+    if find(path).suffix != ".gz" and read_head(path, 4) == PARQUET_MAGIC:
+        return Source(str(find(path))), _parquet_columns(path, wanted)
     content = read_bytes(path)
     if content[:4] == PARQUET_MAGIC:
-        return Source(str(find(path))), _parquet_columns(path, content, wanted)
+        return Source(str(find(path))), _parquet_columns(path, wanted, content)
     table = layout(path, content, header_has)
     if not content.isascii():
         content = content.decode(errors="replace").encode()
@@ -165,33 +167,29 @@ def _numbers(path: Path, table: Layout, place: int, cells: Any, text_is_nan: boo
     return values
 
 
-def parquet_places(path: str | Path, wanted: Sequence[Column]) -> list[str]:
+def parquet_places(path: str | Path, wanted: Sequence[Column], content: bytes | None = None) -> list[str]:
     """Return the names of the wanted columns of a Parquet file; raise InputError for one that is missing."""
-    from pyarrow import ArrowException, parquet
-
-    try:
-        names = parquet.read_schema(path).names
-    except (ArrowException, OSError) as error:
-        raise InputError(f"{path}: is not a whole Parquet file ({str(error).splitlines()[0]})") from error
+    names = _parquet_names(path, content)
     return [names[_place(Path(path), names, column)] for column in wanted]
 
 
-def _parquet_names(path: str | Path, content: bytes) -> tuple[str, ...]:
+def _parquet_names(path: str | Path, content: bytes | None = None) -> tuple[str, ...]:
     from pyarrow import ArrowException, BufferReader, parquet
 
     try:
-        return tuple(parquet.read_schema(BufferReader(content)).names)
+        return tuple(parquet.read_schema(find(path) if content is None else BufferReader(content)).names)
     except (ArrowException, OSError) as error:
         raise InputError(f"{find(path)}: is not a whole Parquet file ({str(error).splitlines()[0]})") from error
 
 
-def _parquet_columns(path: str | Path, content: bytes, wanted: Sequence[Column]) -> list[Array]:
+def _parquet_columns(path: str | Path, wanted: Sequence[Column], content: bytes | None = None) -> list[Array]:
+    """Read columns from a file, or from its content where that is unpacked."""
     from pyarrow import ArrowException, BufferReader, float64, parquet
 
-    names = _parquet_names(path, content)
-    chosen = [names[_place(find(path), names, column)] for column in wanted]
+    chosen = parquet_places(find(path), wanted, content)
     try:
-        table = parquet.read_table(BufferReader(content), columns=chosen)
+        source = find(path) if content is None else BufferReader(content)
+        table = parquet.ParquetFile(source, pre_buffer=False).read(chosen, use_threads=False)
         return [to_numpy(table[name].cast(float64(), safe=False)) for name in chosen]
     except (ArrowException, OSError) as error:
         raise InputError(f"{find(path)}: cannot be read as numbers ({str(error).splitlines()[0]})") from error

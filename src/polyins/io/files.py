@@ -47,6 +47,19 @@ def read_bytes(path: str | Path) -> bytes:
     return content
 
 
+def read_head(path: str | Path, count: int) -> bytes:
+    """Return the first bytes of a file, unpacked if its name ends in `.gz`; raises InputError as `read_bytes` does."""
+    found = find(path)
+    if found.suffix == ".gz":
+        return read_bytes(path)[:count]
+    try:
+        with found.open("rb") as file:
+            head = file.read(count)
+    except OSError as error:
+        raise InputError(f"{found}: cannot be read ({error.strerror})") from error
+    return head if head.strip() else read_bytes(path)[:count]
+
+
 def read_text(path: str | Path) -> str:
     """Return the content of a text file (UTF-8, with or without byte order mark)."""
     try:

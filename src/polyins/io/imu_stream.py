@@ -120,6 +120,8 @@ def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:
 
 
 def _turned(rotation: Array, increments: Array) -> Array:
+    if np.array_equal(rotation, np.eye(3)):
+        return increments
     # a matrix product would wake every BLAS thread for a 3 x 3 matrix
     return np.asarray(np.einsum("ij,tj->ti", rotation, increments))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from polyins.errors import InputError
 from polyins.io import kf_gins
 from polyins.io.columns import PARQUET_MAGIC
-from polyins.io.files import find, read_bytes
+from polyins.io.files import find, read_head
 
 HEAD_BYTES = 16384
 
@@ -17,12 +17,12 @@ def data_format(path: str | Path) -> str:
 
     Raises InputError if it is none of them.
     """
-    content = read_bytes(path)
+    content = read_head(path, HEAD_BYTES)
     if content[:4] == PARQUET_MAGIC:
         return "table"
     if not kf_gins.is_text(content):
         return "kf-gins"
-    lines = content[:HEAD_BYTES].decode("utf-8-sig", errors="replace").splitlines()
+    lines = content.decode("utf-8-sig", errors="replace").splitlines()
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
         return "xsens-dot"
