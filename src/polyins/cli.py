@@ -150,15 +150,18 @@ def _imu_index(names: list[str], wanted: str | None) -> int:
 @cli.command()
 @click.argument("config", type=FILE)
 @click.option("--methods", default=None, help="Names separated by commas; unless given all that the rig allows.")
+@click.option("--threads", type=click.IntRange(1), default=None, help="Runs at once; one for each core unless given.")
 @out_option("polyins-out")
 @as_json_option
 @no_report_option
-def compare(config: Path, methods: str | None, out: Path, as_json: bool, no_report: bool) -> None:
+def compare(config: Path, methods: str | None, threads: int | None, out: Path, as_json: bool, no_report: bool) -> None:
     """Run several methods over one recording, and each IMU on its own."""
-    _compare(config, methods, out, as_json, report=not no_report)
+    _compare(config, methods, out, as_json, report=not no_report, threads=threads)
 
 
-def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report: bool) -> None:
+def _compare(
+    config: Path, methods: str | None, out: Path, as_json: bool, report: bool, threads: int | None = None
+) -> None:
     from polyins import results
     from polyins.comparison import compare as run_all
     from polyins.loading import load
@@ -170,7 +173,7 @@ def _compare(config: Path, methods: str | None, out: Path, as_json: bool, report
     results.make_folder(out)
     announce_compilation()
     with progress("compare") as update:
-        result = run_all(recording, names, progress=update)
+        result = run_all(recording, names, threads=threads, progress=update)
     with progress("writing"):
         results.write_comparison(out, recording, result, report=report)
     if as_json:
@@ -273,13 +276,19 @@ def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
 
 
 @cli.command()
+@click.option(
+    "--throughput", "all_cores", is_flag=True, help="Time recordings per second instead, on one core and all."
+)
 @as_json_option
-def bench(as_json: bool) -> None:
+def bench(all_cores: bool, as_json: bool) -> None:
     """Time every method per epoch against the dense, paper-shaped single filter, in one run."""
     from polyins import results
     from polyins.bench import bench as measure
 
     announce_compilation()
+    if all_cores:
+        _throughput(as_json)
+        return
     with progress("bench") as update:
         document = measure(update)
     if as_json:
@@ -291,6 +300,21 @@ def bench(as_json: bool) -> None:
         for r in document["results"]
     ]
     print_table("CPU time per epoch, 200 Hz IMU and 1 Hz GNSS", columns, rows)
+
+
+def _throughput(as_json: bool) -> None:
+    from polyins import results
+    from polyins.throughput import throughput
+
+    with progress("bench") as update:
+        document = throughput(update)
+    if as_json:
+        print(results.as_json(document))
+        return
+    rates = zip(document["threads"], document["recordings_per_s"], strict=True)
+    rows = [[str(threads), number(rate, 1)] for threads, rate in rates]
+    print_table("16 IMUs, 300 s at 200 Hz, enav-fusion", ["threads", "recordings/s"], rows)
+    say(f"ratio, median of {document['rounds']} rounds: {document['ratio']:.2f}")
 
 
 @cli.group()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from polyins import batch
@@ -11,6 +12,7 @@ from polyins.errors import InputError
 from polyins.evaluation.summary import comparison, summarize
 from polyins.methods import ARRAY_METHODS, find_method
 from polyins.modules import available
+from polyins.parallel import Progress, run_all
 from polyins.recording import Recording
 from polyins.solution import Solution
 
@@ -33,11 +35,14 @@ def compare(
     recording: Recording,
     methods: Sequence[str] | None = None,
     *,
+    threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
     """Run every method, or all that the rig allows, and each IMU on its own: on a vehicle each wheel that gives speed.
 
-    `progress` is called with the share of runs done. Raises InputError for an unknown method, before anything runs.
+    The runs share the cores, or as many threads as are given; the solutions are the same with any number of them.
+    `progress` is called with the share of all runs that is done. Raises InputError for an unknown method, before
+    anything runs.
     """
     wheels = recording.rig.rolling
     if methods is None:
@@ -48,21 +53,26 @@ def compare(
     alone = "wheel-ins" if wheels else "single"
     arrays = [name for name in methods if name != alone]
     names = singles_of(recording)
-    total = len(names) + len(arrays)
+    alone_runs = [(f"{alone}/{name}", 0) if wheels else (alone, i) for i, name in enumerate(names)]
+    # those of the array take longest
+    order = [*((name, 0) for name in arrays), *alone_runs]
+    jobs = [partial(_run, recording, name, imu) for name, imu in order]
+    done = run_all(jobs, threads=threads, progress=progress)
+    each = dict(zip(names, done[len(arrays) :], strict=True))
+    runs = {alone: next(iter(each.values()))} if alone in methods else {}
+    runs |= dict(zip(arrays, done, strict=False))
+    return Comparison(
+        {name: solution for name, (solution, _) in runs.items()},
+        {name: solution for name, (solution, _) in each.items()},
+        comparison(
+            {name: summary for name, (_, summary) in runs.items()}, [summary for _, summary in each.values()], alone
+        ),
+    )
 
-    def stage(number: int) -> Callable[[float], None] | None:
-        return (lambda share: progress((number + share) / total)) if progress else None
 
-    each = {
-        name: batch.run(recording, f"{alone}/{name}" if wheels else alone, imu=0 if wheels else i, progress=stage(i))
-        for i, name in enumerate(names)
-    }
-    solutions = {alone: next(iter(each.values()))} if alone in methods else {}
-    for number, name in enumerate(arrays, len(each)):
-        solutions[name] = batch.run(recording, name, progress=stage(number))
-    summaries = {name: summarize(s, recording.reference, recording.outages) for name, s in solutions.items()}
-    singles = [summarize(s, recording.reference, recording.outages) for s in each.values()]
-    return Comparison(solutions, each, comparison(summaries, singles, alone))
+def _run(recording: Recording, method: str, imu: int, tell: Progress) -> tuple[Solution, Document]:
+    solution = batch.run(recording, method, imu=imu, progress=tell)
+    return solution, summarize(solution, recording.reference, recording.outages)
 
 
 def singles_of(recording: Recording) -> list[str]:
