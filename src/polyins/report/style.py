@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from polyins.report.scene import Shade
@@ -22,32 +23,42 @@ AXES = {
     "ticklen": 4,
     "tickcolor": "#C5CBD6",
     "automargin": True,
+    "title": {"standoff": 15},
 }
 
 
 def finish(figure: Figure, height: int) -> Figure:
     """Give the figure the page's look."""
-    figure.update_layout(
-        height=height,
-        font={"family": FONT, "size": 12.5, "color": INK},
-        paper_bgcolor="white",
-        plot_bgcolor="white",
-        margin={"l": 64, "r": 16, "t": 16, "b": 48},
-        legend={
-            "orientation": "h",
-            "x": 0.0,
-            "y": 1.02,
-            "yanchor": "bottom",
-            "groupclick": "togglegroup",
-            "itemsizing": "constant",
-        },
-        hoverlabel={"font": {"family": FONT}},
-        hovermode="closest",
-        showlegend=True,
-    )
-    figure.update_xaxes(**AXES)
-    figure.update_yaxes(**AXES)
+    figure.update_layout(height=height, template=_look())
     return figure
+
+
+@cache
+def _look() -> Any:
+    """Return the template of all figures, which is validated once and not figure by figure."""
+    from plotly.graph_objects import layout
+
+    return layout.Template(
+        layout={
+            "font": {"family": FONT, "size": 12.5, "color": INK},
+            "paper_bgcolor": "white",
+            "plot_bgcolor": "white",
+            "margin": {"l": 64, "r": 16, "t": 16, "b": 48},
+            "legend": {
+                "orientation": "h",
+                "x": 0.0,
+                "y": 1.02,
+                "yanchor": "bottom",
+                "groupclick": "togglegroup",
+                "itemsizing": "constant",
+            },
+            "hoverlabel": {"font": {"family": FONT}},
+            "hovermode": "closest",
+            "showlegend": True,
+            "xaxis": AXES,
+            "yaxis": AXES,
+        }
+    )
 
 
 def stacked(rows: Sequence[str], columns: int = 1, column_titles: Sequence[str] | None = None) -> Figure:
