@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -33,6 +35,25 @@ Array = npt.NDArray[Any]
 """An array as kernels take it: float64 unless said otherwise."""
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _start_without_scipy() -> None:
+    """Keep Numba's start from importing scipy.linalg, which takes as long as importing NumPy.
+
+    It only asks whether BLAS is there; compiled functions that call BLAS import it themselves.
+    """
+    with suppress(ImportError, AttributeError):
+        from numba.np import linalg
+
+        ask = linalg.ensure_blas
+        linalg.ensure_blas = lambda: None
+        try:
+            importlib.import_module("numba.np.arraymath")
+        finally:
+            linalg.ensure_blas = ask
+
+
+_start_without_scipy()
 
 
 def _compiled(function: F, **options: Any) -> F:
