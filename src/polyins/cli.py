@@ -12,7 +12,7 @@ import click
 
 from polyins import __version__
 from polyins.errors import InputError
-from polyins.screen import announce_compilation, number, print_summaries, print_table, progress, say
+from polyins.screen import compilation_said, number, print_summaries, print_table, progress, say
 
 if TYPE_CHECKING:
     from polyins.recording import Recording
@@ -108,14 +108,13 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     name = method or _usual_method(recording, imu)
     index = _imu_index([one.name for one in recording.rig.imus], imu)
     results.make_folder(out)
-    announce_compilation()
     report = not no_report and long is None
     if long is not None:
-        with progress(name) as update:
+        with compilation_said(), progress(name) as update:
             summary = streaming.run(long, out, name, imu=index, progress=update)
         results.write_summary(out, recording, summary)
     else:
-        with progress(name) as update:
+        with compilation_said(), progress(name) as update:
             solution = batch.run(recording, name, imu=index, progress=update)
         summary = summarize(solution, recording.reference, recording.outages)
         with progress("writing"):
@@ -171,8 +170,7 @@ def _compare(
     with progress("reading"):
         recording = load(config)
     results.make_folder(out)
-    announce_compilation()
-    with progress("compare") as update:
+    with compilation_said(), progress("compare") as update:
         result = run_all(recording, names, threads=threads, progress=update)
     with progress("writing"):
         results.write_comparison(out, recording, result, report=report)
@@ -265,14 +263,30 @@ def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
 
     function = targets.find_target(target, out)
     results.make_folder(out)
-    announce_compilation()
-    with progress(target) as update:
+    with compilation_said(), progress(target) as update:
         document = function(quick, update)
     results.write_document(out / f"{target}.json", document)
     if as_json:
         print(results.as_json(document))
     else:
         targets.print_document(document)
+
+
+@cli.command()
+@as_json_option
+def warmup(as_json: bool) -> None:
+    """Compile ahead of time what the methods need: in a container image, or before a robot sets off."""
+    from polyins import results
+    from polyins.compilation import warm_up
+
+    with progress("compiling") as update:
+        document = warm_up(update)
+    if as_json:
+        print(results.as_json(document))
+        return
+    rows = [[family["name"], number(family["compiled_s"], 1)] for family in document["families"]]
+    print_table("kernels", ["for", "compiled, s"], rows)
+    say(f"cache: {document['cache']}")
 
 
 @cli.command()
@@ -285,11 +299,10 @@ def bench(all_cores: bool, as_json: bool) -> None:
     from polyins import results
     from polyins.bench import bench as measure
 
-    announce_compilation()
     if all_cores:
         _throughput(as_json)
         return
-    with progress("bench") as update:
+    with compilation_said(), progress("bench") as update:
         document = measure(update)
     if as_json:
         print(results.as_json(document))
@@ -306,7 +319,7 @@ def _throughput(as_json: bool) -> None:
     from polyins import results
     from polyins.throughput import throughput
 
-    with progress("bench") as update:
+    with compilation_said(), progress("bench") as update:
         document = throughput(update)
     if as_json:
         print(results.as_json(document))

@@ -17,12 +17,23 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def announce_compilation() -> None:
-    """Say that the kernels will be compiled, if they have not been since installing."""
-    from polyins.kernels.jit import CACHE_FOLDER
+@contextmanager
+def compilation_said() -> Iterator[None]:
+    """Say when kernels are compiled inside the block, which happens once after installing, and how long it took."""
+    from polyins.compilation import watched
 
-    if not any(CACHE_FOLDER.glob("**/*.nbc")):
-        say("polyins: the first run compiles its kernels, which takes about half a minute; later runs load them")
+    def begins() -> None:
+        say(
+            "polyins: compiling the kernels, about half a minute, once; later runs load them "
+            "(polyins warmup compiles them all beforehand)"
+        )
+
+    with watched(begins) as seconds:
+        try:
+            yield
+        finally:
+            if seconds():
+                say(f"polyins: compiled for {seconds():.1f} s")
 
 
 @contextmanager
@@ -31,6 +42,9 @@ def progress(label: str) -> Iterator[Callable[[float], None]]:
 
     Until the first call, and in work that never calls it, the bar only shows that something goes on.
     """
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 

@@ -1,0 +1,100 @@
+"""Compilation seen and done ahead of time: the loop is compiled once for each family of runs, and kept on disk."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from polyins import __version__
+from polyins.recording import GnssStream, Recording
+
+SECONDS = 70.0
+"""of the recordings that the kernels are compiled for: enough for a start"""
+
+
+@contextmanager
+def watched(begins: Callable[[], None] | None = None) -> Iterator[Callable[[], float]]:
+    """Give a function that returns for how many seconds kernels were compiled inside the block so far.
+
+    `begins` is called when the first compilation begins. What is loaded from the cache does not count.
+    """
+    from numba.core import event
+
+    class Listener(event.Listener):
+        depth, since, total = 0, 0.0, 0.0
+
+        def on_start(self, event: Any) -> None:
+            if not self.depth:
+                if begins and not self.total:
+                    begins()
+                self.since = time.perf_counter()
+            self.depth += 1
+
+        def on_end(self, event: Any) -> None:
+            self.depth -= 1
+            if not self.depth:
+                self.total += time.perf_counter() - self.since
+
+    listener = Listener()
+    with event.install_listener("numba:compile", listener):
+        yield lambda: listener.total
+
+
+def warm_up(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
+    """Compile what every family of methods needs, unless the cache has it; return the `warmup` document."""
+    from polyins import batch
+    from polyins.kernels.jit import CACHE_FOLDER
+
+    families = []
+    with watched() as seconds:
+        cases = _families()
+        for number, (name, method, recording) in enumerate(cases):
+            before = seconds()
+            batch.prepare(recording, method).advance(1, 1)
+            families.append({"name": name, "compiled_s": seconds() - before})
+            if progress:
+                progress((number + 1) / len(cases))
+    return {"polyins": __version__, "cache": str(CACHE_FOLDER), "compiled_s": seconds(), "families": families}
+
+
+def _families() -> list[tuple[str, str, Recording]]:
+    """Return a name, a method and a recording for each set of types that the loop is compiled for."""
+    from polyins import bench
+
+    array, vehicle = _headed(bench.array(2, SECONDS)), _headed(bench.vehicle(SECONDS))
+    with_gnss = _with_fixes(vehicle)
+    return [
+        ("arrays with GNSS", "enav-fusion", array),
+        ("arrays with GNSS velocity", "enav-fusion", _with_velocities(array)),
+        ("arrays without GNSS", "enav-fusion", _without_fixes(array)),
+        ("wheels", "triple-ins", vehicle),
+        ("wheels with GNSS", "triple-ins", with_gnss),
+        ("wheels, centralized", "triple-ins/centralized", vehicle),
+        ("wheels, centralized, with GNSS", "triple-ins/centralized", with_gnss),
+    ]
+
+
+def _with_velocities(recording: Recording) -> Recording:
+    assert recording.gnss is not None
+    still = np.zeros_like(recording.gnss.position)
+    return replace(recording, gnss=replace(recording.gnss, velocity=still, velocity_std=still + 0.1))
+
+
+def _without_fixes(recording: Recording) -> Recording:
+    return replace(recording, gnss=None, outages=())
+
+
+def _with_fixes(recording: Recording) -> Recording:
+    reference = recording.reference
+    assert reference is not None
+    fixes = GnssStream(reference.time, reference.position, np.ones_like(reference.position))
+    return replace(recording, gnss=fixes)
+
+
+def _headed(recording: Recording) -> Recording:
+    return replace(recording, start=replace(recording.start, heading=0.0, heading_from="value"))
