@@ -1,0 +1,46 @@
+"""What is said of compilation, and what warm-up leaves behind."""
+
+from __future__ import annotations
+
+import numba
+import pytest
+
+from polyins import compilation
+from polyins.screen import compilation_said
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
+
+def compile_something() -> int:
+    return int(numba.njit(lambda x: x + 1)(1))
+
+
+def test_compiling_is_said_once_with_how_long_it_took(capsys: pytest.CaptureFixture[str]) -> None:
+    with compilation_said():
+        assert compile_something() + compile_something() == 4
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2
+    assert "compiling the kernels" in said[0]
+    assert "compiled for" in said[1]
+
+
+def test_without_compiling_nothing_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    compile_something()
+    with compilation_said():
+        pass
+    assert capsys.readouterr().err == ""
+
+
+def test_nested_compilations_count_once() -> None:
+    with compilation.watched() as seconds:
+        assert seconds() == 0.0
+        inner = numba.njit(lambda x: x + 1)
+        assert numba.njit(lambda x: inner(x))(1) == 2
+        assert seconds() > 0.0
+
+
+def test_every_family_starts() -> None:
+    from polyins import batch
+
+    for name, method, recording in compilation._families():
+        assert batch.prepare(recording, method).inputs.time.size > 2, name
