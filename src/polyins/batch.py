@@ -313,7 +313,6 @@ def _state(
 
 def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, geodetic: bool) -> None:
     """Put a member where it is mounted, moving as the turning array does: `rate` is its own, rad/s."""
-
     c = alignment.rotation_matrix(start.attitude)
     lever_arm = c @ -member.to_origin
     turning = c @ rate - alignment.earth_rate(start.position, geodetic)

@@ -286,7 +286,6 @@ def fill_lane(w: Array, lane: int, imu: Imu, start: Start, attitude: Array, erro
 
     `attitude`: roll, pitch, heading of the IMU, rad; `errors`: its twelve slow errors.
     """
-
     c = alignment.rotation_matrix(attitude)
     to_wheel = np.zeros(3) if imu.wheel is None else imu.wheel.lever_arm
     place = alignment.rotation_matrix(start.attitude) @ imu.position - c @ to_wheel

@@ -78,6 +78,9 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
     files = tuple(ImuFile(entry) for entry in config.imus)
     extents = tuple(file.extent() for file in files)
     span = _span(files, extents)
+    ends = np.array([extent.last for extent in extents])
+    if timesync.common_end(ends) > ends.min():
+        return None  # one stops long before the others, which go on without it
     streams = tuple(Reel(file).until(span[0] + HEAD_S, span[0]) for file in files)
     notes = [
         note for number in range(len(files)) for note in _checked(files[number], streams[number], number, document)
@@ -271,7 +274,7 @@ def _navigate(run: Prepared, stretch: Aligned) -> Solution:
 def _whole(last: Solution, recording: LongRecording, filter_s: float, first_call_s: float) -> Solution:
     """Return what is known of the whole solution beside its epochs, which are those of the last part."""
     begin, end = recording.span
-    warnings = list(recording.head.warnings)
+    warnings = [*recording.head.warnings, *timesync.late_warnings(recording.head.imus)]
     for imu, extent in zip(recording.head.rig.imus, recording.extents, strict=True):
         gaps = [gap for gap in extent.gaps if gap[1] > begin and gap[0] < end]
         if gaps:

@@ -13,6 +13,7 @@ from polyins.errors import InputError
 from polyins.io import checks, table
 from polyins.io.arrow_arrays import to_numpy
 from polyins.io.columns import parquet_places
+from polyins.io.faults import without_faults
 from polyins.io.files import find
 from polyins.io.imu_stream import in_array_axes
 from polyins.io.rows import ImuRows, Source
@@ -71,6 +72,10 @@ class ImuFile:
             skipped = 0 if before is None else 1
             fresh = ImuRows(self.source, rows.time[skipped:], rows.dtheta[skipped:], rows.dvel[skipped:])
             checks.check_finite(self.source, {"gyro": fresh.dtheta, "accel": fresh.dvel}, done)
+            for text in without_faults(fresh, self.entry.name, self.entry.clock_offset_s)[1]:
+                raise InputError(
+                    text.replace("left out", "of a recording this long nothing is left out; expected none")
+                )
             yield in_array_axes(fresh, self.entry)
             before = [column[-1:] for column in values]
             done += len(fresh.time)
