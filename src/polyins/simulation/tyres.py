@@ -1,8 +1,8 @@
 """A robot's body on four tyres that push and never pull.
 
-A tyre under wheel i is a spring and a damper between the ground g_i and the body's corner h_i = z + x_i pitch - y_i roll
-(heights upwards, y to the right). At rest it is pressed in by d_0; with d_i = d_0 + g_i - h_i its force over the body's
-mass is
+A tyre under wheel i is a spring and a damper between the ground g_i and the body's corner
+h_i = z + x_i pitch - y_i roll (heights upwards, y to the right). At rest it is pressed in by d_0. With
+d_i = d_0 + g_i - h_i its force over the body's mass is
 
     f_i = max(0, k d_i + c d_i')  on the ground, d_i > 0,    f_i = 0  above it.
 
@@ -39,7 +39,7 @@ class Suspension:
     """ratio, of the heave; of the others it grows with their frequency, as the tyres are the same"""
 
     def arms(self) -> Array:
-        """Return by how much heave, pitch and roll lift each corner, shape (3, 4): front left, right, rear left, right."""
+        """Return by how much each mode lifts each corner, front left, right, rear left, right, shape (3, 4)."""
         x, y = self.wheelbase / 2.0, self.track / 2.0
         return np.array([[1.0, 1.0, 1.0, 1.0], [x, x, -x, -x], [y, -y, y, -y]])
 
@@ -62,9 +62,7 @@ def bounce(ground: Array, step: float, suspension: Suspension, gravity: float) -
 
 
 @kernel
-def _bounce(
-    ground: Array, step: float, arms: Array, acting: Array, tyre: Array, motion: Array, change: Array
-) -> None:
+def _bounce(ground: Array, step: float, arms: Array, acting: Array, tyre: Array, motion: Array, change: Array) -> None:
     """Fill motion and change from their first row."""
     slopes, place, speed = np.empty((4, 6)), np.empty(3), np.empty(3)
     for k in range(1, len(ground)):
