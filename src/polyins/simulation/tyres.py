@@ -81,7 +81,7 @@ def _bounce(ground: Array, step: float, arms: Array, acting: Array, tyre: Array,
 @kernel
 def _mean(slopes: Array, i: int) -> float:
     """Return the mean slope of the step."""
-    return (slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]) / 6.0
+    return float(slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]) / 6.0
 
 
 @kernel
