@@ -51,7 +51,8 @@ def parts(errors: Errors, recording: Recording) -> dict[str, dict[str, float]]:
     """Return rms and largest horizontal error, m, while fixes come and in the outages."""
     inside = np.zeros(len(errors.time), dtype=bool)
     for begin, end in recording.outages:
-        inside |= (errors.time >= begin) & (errors.time <= end)
+        # until the first fix has come
+        inside |= (errors.time >= begin) & (errors.time <= end + 1.0)
     return {
         name: {"rms_m": rigid_array.rms(errors.horizontal[part]), "largest_m": float(errors.horizontal[part].max())}
         for name, part in {"in outages": inside, "with fixes": ~inside}.items()
