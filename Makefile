@@ -1,8 +1,9 @@
 VENV := .venv
 PYTHON ?= python3
 BIN := $(VENV)/bin
+PICTURES := a3-sources a5-roughness afig7-gyro split-imus
 
-.PHONY: demo test lint types bench clean
+.PHONY: demo test lint types bench reproduce pictures clean
 
 $(BIN)/polyins: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -25,6 +26,14 @@ lint: $(BIN)/pytest
 
 types: $(BIN)/pytest
 	$(BIN)/mypy
+
+reproduce: $(BIN)/polyins
+	$(BIN)/polyins reproduce all --quick --out build/reproduced >/dev/null
+
+# The documentation's pictures, from the full runs of the targets that draw; needs chromium.
+pictures: $(BIN)/polyins
+	$(BIN)/polyins reproduce figures --out build/figures >/dev/null
+	tools/photograph build/figures docs/pictures $(PICTURES)
 
 bench: $(BIN)/polyins
 	$(BIN)/polyins bench

@@ -257,17 +257,22 @@ def simulate(scenario: Path, out: Path, seed: int | None) -> None:
 @out_option("polyins-reproduced")
 @as_json_option
 def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
-    """Reproduce measured or published figures. TARGET: flights, wid, array, consistency."""
+    """Reproduce published or measured figures. TARGET: all, figures, or one, such as a3."""
     from polyins import results
-    from polyins.reproduce import targets
+    from polyins.reproduce import targets, together
 
-    function = targets.find_target(target, out)
+    names = targets.SEVERAL.get(target, ())
+    function = None if names else targets.find_target(target, out)
     results.make_folder(out)
     with compilation_said(), progress(target) as update:
-        document = function(quick, update)
+        document = function(quick, update) if function else together.reproduce(target, names, quick, out, update, say)
     results.write_document(out / f"{target}.json", document)
     if as_json:
         print(results.as_json(document))
+    elif names:
+        for part in together.parts(document):
+            targets.print_document(part)
+        say(f"page: {out / 'index.html'}")
     else:
         targets.print_document(document)
 

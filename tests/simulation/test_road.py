@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from polyins.simulation.road import STEP, Bump, Roughness, ground
+from polyins.simulation.road import FINE, STEP, Bump, Roughness, Wheel, ground
 from polyins.simulation.shuttle import shuttle_path, straights
 from polyins.simulation.transmission import transmit
 
+POINT, WHEEL = Wheel(0.0, 0.0), Wheel(0.125, 0.08)
 FLAT = Roughness(0.0, 0.1, 3.0, 0.5, 4.0, 0.4)
 
 
 def rough(correlation=0.5, sigma=0.4, seed=0, length=4000.0):
-    drawn = ground(length, Roughness(2e-3, 0.1, 3.0, correlation, 4.0, sigma), (), 0.0, np.random.default_rng(seed))
+    drawn = ground(length, Roughness(2e-3, 0.1, 3.0, correlation, 4.0, sigma), (), POINT, np.random.default_rng(seed))
     return drawn(STEP * np.arange(int(length / STEP)))
 
 
@@ -42,13 +43,24 @@ def test_patches_differ_in_roughness():
 
 def test_a_book_lifts_the_wheels_of_its_side_only():
     book = Bump(5.0, 0.2, 0.012, left=True, right=False)
-    drawn = ground(10.0, FLAT, (book,), 0.08, np.random.default_rng(0))
-    along = np.array([4.9, 5.1, 5.3])
+    drawn = ground(10.0, FLAT, (book,), WHEEL, np.random.default_rng(0))
+    along = np.array([4.85, 5.1, 5.35])
     np.testing.assert_allclose(drawn(along)[:, 0], [0.0, 0.012, 0.0], atol=1e-5)
     np.testing.assert_allclose(drawn(along)[:, 1], 0.0, atol=1e-12)
-    # the tyre rounds its edge
+    # the footprint makes a ramp of its edge
     edge = drawn(np.linspace(4.9, 5.1, 201))[:, 0]
-    assert np.diff(edge).max() < 0.012 * 0.02 / 0.5
+    assert np.diff(edge).max() < 0.012 * 0.0011 / 0.08
+
+
+def test_a_round_wheel_rolls_over_an_edge_along_an_arc():
+    # between two points of the profile, which are its first and its last
+    book = Bump(5.001, 0.2, 0.015, left=True, right=True)
+    drawn = ground(10.0, FLAT, (book,), Wheel(0.125, 0.0), np.random.default_rng(0))
+    before = FINE * np.arange(4, 40)
+    # the disc touches the edge; its axle is on a circle about it
+    arc = 0.015 - 0.125 + np.sqrt(np.maximum(0.125**2 - before**2, 0.0))
+    np.testing.assert_allclose(drawn(5.0025 - before)[:, 0], np.maximum(arc, 0.0), atol=2e-4)
+    np.testing.assert_allclose(drawn(5.2 + before)[:, 1], np.maximum(arc, 0.0), atol=2e-4)
 
 
 def test_a_spring_passes_slow_motion_and_stops_fast_motion():

@@ -14,12 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from polyins import batch
-from polyins.evaluation.errors import compare_to_reference
 from polyins.recording import Recording
 from polyins.reproduce import rigid_array
 from polyins.reproduce.chips import Chips, parts_of
-from polyins.reproduce.pictures import bars, lines, write_figure
+from polyins.reproduce.pictures import bars, write_figure
 from polyins.reproduce.progress import Steps
 from polyins.simulation.error_scenario import Errors
 from polyins.simulation.run import TrueRun, record
@@ -30,8 +28,6 @@ QUICK_GROUPS = (1,)
 SEEDS = (0, 1, 2, 3)
 QUICK_SEEDS = (0,)
 """of sources and candidates"""
-POINTS = 6000
-"""of a curve in a picture, at most"""
 EXACT_M = (1e-4, 1e-4, 1e-4)
 """std of fixes that take nothing from the gain"""
 
@@ -99,8 +95,6 @@ def reproduce(
     candidates = {} if quick else try_candidates(run, errors, chips, seeds, steps)
     if out is not None:
         write_figure(sources_figure(sources, scenario.imus.count), out / "a3-sources.html")
-        shown = rigid_array.recording_of(with_chips(run, errors, chips), seed=1)
-        write_figure(error_figure(shown), out / "a3-errors.html")
     return {
         "target": "a3",
         "paper": {
@@ -269,17 +263,6 @@ def size_for(figure: float, sources: Mapping[str, Mapping[str, float]], at_most:
     without = sources[names[names.index("g-sensitivity") - 1]]["single"] ** 2
     largest = CANDIDATES["g-sensitivity"]["g_sensitivity_deg_s_g"]
     return float(largest * np.sqrt(max(figure**2 - without, 0.0) / (at_most**2 - without)))
-
-
-def error_figure(recording: Recording) -> Any:
-    """Return the picture of the array's position error over time, as Fig. 8."""
-    assert recording.reference is not None
-    errors = compare_to_reference(batch.run(recording, "enav-fusion"), recording.reference)
-    every = slice(None, None, max(len(errors.time) // POINTS, 1))
-    time = errors.time[every].tolist()
-    axes = zip(("north", "east", "down"), errors.position[every].T, strict=True)
-    curves = {name: (time, values.tolist()) for name, values in axes}
-    return lines(curves, "time (s)", "eNav-Fusion, Group 1: error (m)", markers=False)
 
 
 def sources_figure(sources: Mapping[str, Mapping[str, float]], imus: int) -> Any:

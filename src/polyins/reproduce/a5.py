@@ -6,17 +6,19 @@ own; a figure is the rms over all outages of all seeds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polyins import bench
+from polyins.recording import Recording
 from polyins.reproduce import nonrigid
+from polyins.reproduce.parallel import in_order
 from polyins.reproduce.pictures import lines, write_figure
 from polyins.reproduce.progress import Steps
-from polyins.reproduce.rigid_array import maxima
+from polyins.reproduce.rigid_array import Array, maxima
 from polyins.simulation.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
 SEEDS = {"rigid": 10, "test A": 20, "test B": 20}
 QUICK_SEEDS = 1
-ROUGHNESS_MM = (1.2, 1.6, 2.0)
+SWEPT = ("single", "imu-fusion", "nav-fusion")
 
 PAPER = {
     "rigid": {"single": 4.87},
@@ -33,16 +35,26 @@ PAPER = {
     "test B": {"single": 8.41, "imu-fusion": 4.21, "nav-fusion": 3.28, "enav-fusion": 3.23},
 }
 """m; rigid: of Table III, sixteen IMUs on a car, which Table V divides by"""
-PAPER_TIME = {"nav-fusion": 6.05, "enav-fusion": 1.09}
 
-CASES: tuple[bench.Case, ...] = (
-    ("single", "single", 1, True),
-    ("imu-fusion", "imu-fusion", 6, True),
-    ("nav-fusion", "nav-fusion", 6, True),
-    ("enav-fusion", "enav-fusion", 6, True),
-)
-ROUNDS, SECONDS = 5, 100.0
-QUICK_ROUNDS, QUICK_SECONDS = 1, 70.0
+
+@dataclass(frozen=True)
+class Sweep:
+    """A figure of a test that is varied about its scenario's."""
+
+    test: str
+    change: Callable[[Scenario, float], Scenario]
+    values: tuple[float, ...]
+    own: float
+    """the scenario's"""
+    seeds: int
+    title: str
+
+
+SWEEPS = {
+    "roughness_mm": Sweep("test A", nonrigid.with_roughness, (1.2, 1.6, 2.0), 1.6, 20, "roughness of the lawn, mm rms"),
+    "book_heights": Sweep("test B", nonrigid.with_books, (0.5, 0.75, 1.0), 1.0, 10, "thickness of the books, share"),
+    "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 10, "thickness of the rulers, mm"),
+}
 
 Document = dict[str, Any]
 
@@ -50,61 +62,61 @@ Document = dict[str, Any]
 def reproduce(
     quick: bool = False, progress: Callable[[float], None] | None = None, out: Path | None = None
 ) -> Document:
-    """Run the rigid array, test A, test B and the sweep over the lawn's roughness, and time the methods.
+    """Run the rigid array, test A, test B and the sweeps over the lawn, the books and the rulers.
 
-    `quick` takes one seed, the first 330 s. `out` is the folder for the picture.
+    `quick` takes one seed, the first 330 s. `out` is the folder for the pictures.
     """
     seeds = dict.fromkeys(SEEDS, QUICK_SEEDS) if quick else SEEDS
-    others = [roughness for roughness in ROUGHNESS_MM if roughness != lawn(quick)]
-    steps = Steps(progress, sum(seeds.values()) + len(others) * seeds["test A"] + 1)
+    others = sum((QUICK_SEEDS if quick else sweep.seeds) * (len(sweep.values) - 1) for sweep in SWEEPS.values())
+    steps = Steps(progress, sum(seeds.values()) + others)
     tables = {test: table(nonrigid.scenario_of(test, quick), count, steps) for test, count in seeds.items()}
-    sweep = {lawn(quick): excess(tables["test A"])}
-    for roughness in others:
-        scenario = nonrigid.with_roughness(nonrigid.scenario_of("test A", quick), roughness)
-        sweep[roughness] = excess(table(scenario, seeds["test A"], steps, ("nav-fusion", "imu-fusion"), singles=False))
+    sweeps = {name: run_sweep(sweep, tables[sweep.test], quick, steps) for name, sweep in SWEEPS.items()}
     if out is not None:
-        write_figure(sweep_figure(sweep), out / "a5-roughness.html")
+        for name, sweep in SWEEPS.items():
+            write_figure(sweep_figure(sweeps[name], sweep.title), out / f"a5-{name.partition('_')[0]}.html")
     return {
         "target": "a5",
-        "paper": {
-            **{name: {**row, "ratio_to_rigid_single": _ratios(PAPER["rigid"], row)} for name, row in PAPER.items()},
-            "time_ratio": PAPER_TIME,
-        },
-        "polyins": {
-            **{name: with_ratios(row, tables["rigid"]) for name, row in tables.items()},
-            "roughness_mm": {f"{key:g}": row for key, row in sorted(sweep.items())},
-            "time_ratio": time_ratios(quick, steps),
-        },
+        "paper": {name: {**row, "ratio_to_rigid_single": _ratios(PAPER["rigid"], row)} for name, row in PAPER.items()},
+        "polyins": {**{name: with_ratios(row, tables["rigid"]) for name, row in tables.items()}, **sweeps},
         "settings": {
-            "seeds": seeds,
+            "seeds": {**seeds, **{name: QUICK_SEEDS if quick else sweep.seeds for name, sweep in SWEEPS.items()}},
             "outages": {name: len(nonrigid.scenario_of(name, quick).outage_intervals()) for name in seeds},
-            "time_ratio": "full matrices as in the paper, six IMUs, the single IMU is the unit",
             "scenarios": {name: nonrigid.scenario_of(name, quick).model_dump(mode="json") for name in seeds},
         },
     }
 
 
-def lawn(quick: bool) -> float:
-    """Return the roughness of test A, mm."""
-    road = nonrigid.scenario_of("test A", quick).road
-    assert road is not None
-    return road.roughness_mm
+def run_sweep(sweep: Sweep, own: Mapping[str, float], quick: bool, steps: Steps) -> Document:
+    """Return the figures by value of what is varied; `own` are those of the test as it is."""
+    scenario = nonrigid.scenario_of(sweep.test, quick)
+    seeds = QUICK_SEEDS if quick else sweep.seeds
+    return {
+        f"{value:g}": excess(own if value == sweep.own else table(sweep.change(scenario, value), seeds, steps, SWEPT))
+        for value in sweep.values
+    }
 
 
 def table(
-    scenario: Scenario, seeds: int, steps: Steps, methods: tuple[str, ...] = METHODS, *, singles: bool = True
+    scenario: Scenario, seeds: int, steps: Steps, names: Sequence[str] = ("single", *METHODS)
 ) -> dict[str, float]:
     """Return the rms over outages and seeds, m, by method; of `single` over all IMUs."""
-    found: dict[str, list[Any]] = {name: [] for name in (*(("single",) if singles else ()), *methods)}
-    for number in range(seeds):
+
+    def run(number: int) -> dict[str, Array]:
         report = steps.next()
         recording = nonrigid.recording_of(scenario, number)
-        if singles:
-            found["single"] += [maxima(recording, "single", imu=i) for i in range(len(recording.imus))]
-        for method in methods:
-            found[method].append(maxima(recording, method))
+        found = {name: errors(recording, name) for name in names}
         report(1.0)
-    return nonrigid.pooled(found)
+        return found
+
+    found = in_order(run, range(seeds))
+    return nonrigid.pooled({name: [each[name] for each in found] for name in names})
+
+
+def errors(recording: Recording, name: str) -> Array:
+    """Return the largest horizontal error in each outage, m; of `single` for every IMU."""
+    if name != "single":
+        return maxima(recording, name)
+    return np.array([maxima(recording, name, imu=i) for i in range(len(recording.imus))])
 
 
 def with_ratios(row: dict[str, float], rigid: dict[str, float]) -> Document:
@@ -119,25 +131,15 @@ def with_ratios(row: dict[str, float], rigid: dict[str, float]) -> Document:
     }
 
 
-def excess(row: dict[str, float]) -> dict[str, float]:
-    """Return IMU-Fusion, Nav-Fusion and by how much more the former errs, m."""
-    imu, nav = row["imu-fusion"], row["nav-fusion"]
-    return {"imu-fusion": imu, "nav-fusion": nav, "excess": imu - nav}
+def excess(row: Mapping[str, float]) -> dict[str, float]:
+    """Return the methods of a sweep, m, and by how much more IMU-Fusion errs than Nav-Fusion."""
+    return {**{name: row[name] for name in SWEPT}, "excess": row["imu-fusion"] - row["nav-fusion"]}
 
 
-def time_ratios(quick: bool, steps: Steps) -> dict[str, float]:
-    """Return the time of each method over that of a single IMU, with full matrices."""
-    rounds, seconds = (QUICK_ROUNDS, QUICK_SECONDS) if quick else (ROUNDS, SECONDS)
-    cost = bench.measure(CASES, rounds, seconds, steps.next())
-    ratio = np.median(cost / cost[:, :1], axis=0)
-    return {name: float(value) for (name, *_), value in zip(CASES, ratio, strict=True) if name != "single"}
-
-
-def sweep_figure(sweep: dict[float, dict[str, float]]) -> Figure:
-    """Return the picture of the sweep: errors over roughness."""
-    order = sorted(sweep)
-    curves = {name: (order, [sweep[key][name] for key in order]) for name in ("imu-fusion", "nav-fusion")}
-    return lines(curves, "roughness of the lawn, mm rms", "outage error, m")
+def sweep_figure(sweep: Mapping[str, Mapping[str, float]], title: str) -> Figure:
+    """Return the picture of a sweep: errors over what is varied."""
+    values = [float(value) for value in sweep]
+    return lines({name: (values, [row[name] for row in sweep.values()]) for name in SWEPT}, title, "outage error, m")
 
 
 def _ratios(unit: dict[str, float], row: dict[str, float]) -> dict[str, float]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from polyins.recording import Recording
 from polyins.reproduce import nonrigid
 from polyins.reproduce.feedback import outage_maxima
+from polyins.reproduce.parallel import in_order
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.rigid_array import maxima
 
@@ -57,14 +58,16 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
 def table(test: str, seeds: int, quick: bool, steps: Steps) -> dict[str, float]:
     """Return the rms over outages and seeds, m, by variant."""
     scenario = nonrigid.scenario_of(test, quick)
-    found: dict[str, list[Array]] = {name: [] for name in VARIANTS}
-    for number in range(seeds):
+
+    def run(number: int) -> dict[str, Array]:
         report = steps.next()
         recording = nonrigid.recording_of(scenario, number)
-        for name, run in VARIANTS.items():
-            found[name].append(run(recording))
+        found = {name: variant(recording) for name, variant in VARIANTS.items()}
         report(1.0)
-    return nonrigid.pooled(found)
+        return found
+
+    found = in_order(run, range(seeds))
+    return nonrigid.pooled({name: [each[name] for each in found] for name in VARIANTS})
 
 
 def with_costs(row: dict[str, float]) -> Document:

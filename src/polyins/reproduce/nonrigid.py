@@ -41,6 +41,20 @@ def with_roughness(scenario: Scenario, roughness_mm: float) -> Scenario:
     return scenario.model_copy(update={"road": scenario.road.model_copy(update={"roughness_mm": roughness_mm})})
 
 
+def with_books(scenario: Scenario, share: float) -> Scenario:
+    """Return the scenario with books of a share of their thickness."""
+    assert scenario.road is not None
+    books = tuple(book.model_copy(update={"height_m": share * book.height_m}) for book in scenario.road.books)
+    return scenario.model_copy(update={"road": scenario.road.model_copy(update={"books": books})})
+
+
+def with_thickness(scenario: Scenario, thickness_mm: float) -> Scenario:
+    """Return the scenario with rulers of another thickness, mm: stiffness grows with its third power."""
+    assert scenario.rulers is not None
+    rulers = scenario.rulers.model_copy(update={"thickness_m": thickness_mm * 1e-3})
+    return scenario.model_copy(update={"rulers": rulers})
+
+
 def recording_of(scenario: Scenario, number: int) -> Recording:
     """Return the recording of the seed of a number, counted from 0: another ground, other rulers, other errors."""
     seed = FIRST_SEED + number

@@ -54,4 +54,4 @@ def lines(
 def write_figure(figure: Figure, path: Path) -> None:
     """Write a figure as a page that needs no network."""
     with whole(path) as beside:
-        figure.write_html(beside, include_plotlyjs=True)
+        figure.write_html(beside, include_plotlyjs=True, config={"displayModeBar": False})

@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polyins.errors import InputError
 from polyins.recording import Recording
 from polyins.reproduce import flights, rigid_array
+from polyins.reproduce.pictures import lines, write_figure
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.rigid_array import maxima, rms
 
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
 COUNTS = (1, 2, 3, 4)
+NAME = "split-imus.html"
 SEED = 0
 
 Document = dict[str, Any]
 
 
-def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> Document:
+def reproduce(
+    quick: bool = False, progress: Callable[[float], None] | None = None, out: Path | None = None
+) -> Document:
     """Run eNav-Fusion of one to four IMUs in the scenario of a3 and over the real flights, and return the document.
 
     `quick` takes the first eleven outages and every fourth flight. The flights are null without the data set
-    `quadrotor`.
+    `quadrotor`. `out` is the folder for the picture.
     """
     steps = Steps(progress, 2)
     scenario = rigid_array.base_scenario(quick)
@@ -32,6 +40,8 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     run = rigid_array.with_errors(rigid_array.drive(scenario), errors)
     simulated = by_imus(rigid_array.recording_of(run, SEED), steps.next())
     flown = fly(quick, steps.next())
+    if out is not None:
+        write_figure(split_figure({"simulation": simulated, **({"real flights": flown} if flown else {})}), out / NAME)
     return {
         "target": "split",
         "paper": {},
@@ -42,6 +52,19 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
             "flights": "data set quadrotor, outages of 10 s" if flown else "data set quadrotor is not at hand",
         },
     }
+
+
+def split_figure(figures: Mapping[str, Mapping[int, float]]) -> Figure:
+    """Return the picture of the outage error over the number of IMUs, over that of one, with the fitted curves."""
+    counts = list(map(float, COUNTS))
+    curves = {}
+    for name, by_count in figures.items():
+        fit = split(by_count)
+        fitted = np.hypot(fit["common_m"], fit["independent_m"] / np.sqrt(counts))
+        curves[name] = (counts, [by_count[count] / by_count[1] for count in COUNTS])
+        curves[f"{name}: fit"] = (counts, (fitted / by_count[1]).tolist())
+    curves["nothing in common"] = (counts, (1.0 / np.sqrt(counts)).tolist())
+    return lines(curves, "IMUs", "outage error over that of one")
 
 
 def by_imus(recording: Recording, progress: Callable[[float], None]) -> dict[int, float]:

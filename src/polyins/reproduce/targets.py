@@ -1,4 +1,4 @@
-"""What can be reproduced, by name."""
+"""What can be reproduced, by name, and how a document is shown."""
 
 from __future__ import annotations
 
@@ -15,12 +15,18 @@ from polyins.screen import number, print_table, say
 Document = dict[str, Any]
 
 TARGETS = (
-    *("flights", "wid", "array", "consistency", "a1", "a2", "a3", "a4", "a5", "a6", "afig3", "split"),
+    *("flights", "wid", "array", "consistency"),
+    *("a1", "a2", "a3", "a4", "a5", "a6", "afig3", "afig6", "afig7", "afig8", "split"),
     *("b4", "b5", "b6", "b7", "b8", "bfig7", "bfig8", "bfig9", "bfig10"),
 )
 """Each is a module of this package with a function `reproduce(quick, progress)`."""
-WITH_REPORTS = ("wid", "a3", "a5", "afig3", "bfig7", "bfig8", "bfig9", "bfig10")
-"""Those whose function also takes `out`, the folder for reports."""
+WITH_REPORTS = (
+    *("wid", "a3", "a5", "afig3", "afig6", "afig7", "afig8", "split"),
+    *("bfig7", "bfig8", "bfig9", "bfig10"),
+)
+"""Those whose function also takes `out`, the folder for reports and pictures, whose names begin with the target's."""
+SEVERAL = {"all": TARGETS, "figures": WITH_REPORTS}
+"""Several targets under one name."""
 WITH_TABLES = ("wid",)
 """Those with a function `print_tables`."""
 
@@ -31,8 +37,9 @@ def find_target(name: str, out: Path) -> Callable[[bool, Callable[[float], None]
     Raises InputError with the nearest known target for an unknown one.
     """
     if name not in TARGETS:
-        near = difflib.get_close_matches(name, TARGETS, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(TARGETS)}"
+        known = (*TARGETS, *SEVERAL)
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
         raise InputError(f"reproduce: target {name!r} is unknown; {hint}")
     function: Callable[..., Document] = importlib.import_module(f"polyins.reproduce.{name}").reproduce
     return partial(function, out=out) if name in WITH_REPORTS else function
@@ -46,13 +53,24 @@ def print_document(document: Document) -> None:
     if document["target"] in WITH_TABLES:
         importlib.import_module(f"polyins.reproduce.{document['target']}").print_tables(document["polyins"])
         return
+    print_table(document["target"], ["figure", "paper", "polyins"], rows_of(document))
+    for text in words_of(document):
+        say(text)
+
+
+def rows_of(document: Document) -> list[list[str]]:
+    """Return each figure's path, the paper's and polyins's."""
     published = dict(_leaves(document["paper"]))
     figures = dict(_leaves(document["polyins"]))
-    rows = [[path, published.get(path, "-"), figures.get(path, "-")] for path in dict.fromkeys([*figures, *published])]
-    print_table(document["target"], ["figure", "paper", "polyins"], rows)
-    for value in document["polyins"].values():
-        if isinstance(value, str):
-            say(value)
+    return [[path, published.get(path, "-"), figures.get(path, "-")] for path in dict.fromkeys([*figures, *published])]
+
+
+def words_of(document: Document) -> list[str]:
+    """Return what a document says in words; that something stands in for a data set first."""
+    texts = [value for value in document["settings"].values() if isinstance(value, str)]
+    return [text for text in texts if "stand in" in text] + [
+        value for value in document["polyins"].values() if isinstance(value, str)
+    ]
 
 
 def _leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:

@@ -15,9 +15,10 @@ from polyins.rig import DEG
 from polyins.simulation.cantilever import Cantilever
 from polyins.simulation.flexible import Ruler
 from polyins.simulation.path import Path, World
-from polyins.simulation.road import Bump, Ground, Roughness, ground
-from polyins.simulation.shaking import Suspension, way
+from polyins.simulation.road import Bump, Ground, Roughness, Wheel, ground
+from polyins.simulation.shaking import way
 from polyins.simulation.shuttle import shuttle_path, straights
+from polyins.simulation.tyres import Suspension
 
 Array = NDArray[np.float64]
 
@@ -159,9 +160,11 @@ class Road(Section):
     roll_hz: Positive = 12.5
     """Hz"""
     damping: Positive = 0.2
-    """ratio, of all three"""
+    """ratio, of the heave"""
+    wheel_radius_m: NotNegative = 0.125
+    """m"""
     envelope_m: NotNegative = 0.08
-    """length over which a tyre averages the ground, m"""
+    """length of a tyre's footprint, over which it levels the ground, m"""
 
     @model_validator(mode="after")
     def _wavelengths_are_in_order(self) -> Self:
@@ -186,4 +189,4 @@ class Road(Section):
             for book in self.books
         ]
         length = float(way(path, np.linspace(0.0, path.duration, int(path.duration * 100.0) + 1))[-1])
-        return ground(length, roughness, bumps, self.envelope_m, rng)
+        return ground(length, roughness, bumps, Wheel(self.wheel_radius_m, self.envelope_m), rng)

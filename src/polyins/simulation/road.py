@@ -1,4 +1,9 @@
-"""Rough ground under two wheel tracks, and books lying on it."""
+"""Rough ground under two wheel tracks, and books lying on it, as round and soft wheels meet them.
+
+A wheel is a bed of equal springs around a disc. The disc rolls over the ground: its lowest point is the greatest of the
+ground lifted by the disc's own curve. Over its footprint the springs level what is left, all alike: a small bump under
+any of them adds the same force.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +19,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-STEP = 0.01  # m between the points of a profile
+STEP = 0.01  # m between the points of a random profile
+FINE = 0.0025  # m between those that wheels roll over
 MARGIN = 2.0  # m before and beyond the way travelled
 
 
@@ -52,8 +58,18 @@ class Bump:
 
 
 @dataclass(frozen=True)
+class Wheel:
+    """What of a wheel decides how it meets the ground."""
+
+    radius: float
+    """m"""
+    footprint: float
+    """length over which its tyre levels the ground, m"""
+
+
+@dataclass(frozen=True)
 class Ground:
-    """Heights of the ground that the left and the right wheels follow, smoothed by the tyres."""
+    """Heights that the left and the right wheels follow over the ground."""
 
     heights: CubicSpline
     """m upwards, over m along the way: (T,) -> (T, 2)"""
@@ -64,9 +80,9 @@ class Ground:
 
 
 def ground(
-    length: float, roughness: Roughness, bumps: Sequence[Bump], envelope: float, rng: np.random.Generator
+    length: float, roughness: Roughness, bumps: Sequence[Bump], wheel: Wheel, rng: np.random.Generator
 ) -> Ground:
-    """Draw the ground along a way of a length, m; tyres average it over `envelope`, m."""
+    """Draw the ground along a way of a length, m, as a wheel meets it."""
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import convolve1d
 
@@ -75,18 +91,33 @@ def ground(
     share = roughness.correlation
     heights = np.sqrt(share) * common[:, None] + np.sqrt(1.0 - share) * np.column_stack([left, right])
     heights = heights * (roughness.rms * _patches(along.size, roughness, rng))[:, None]
+    fine = np.arange(-MARGIN, length + MARGIN - STEP, FINE)
+    heights = CubicSpline(along, heights)(fine)
     for bump in bumps:
-        under = (along >= bump.begin) & (along < bump.begin + bump.length)
+        under = (fine >= bump.begin) & (fine < bump.begin + bump.length)
         heights[under] += bump.height * np.array([bump.left, bump.right])
-    return Ground(CubicSpline(along, convolve1d(heights, _footprint(envelope), axis=0, mode="nearest")))
+    level = convolve1d(_rolled(heights, wheel.radius), _footprint(wheel.footprint), axis=0, mode="nearest")
+    return Ground(CubicSpline(fine, level))
+
+
+def _rolled(heights: Array, radius: float) -> Array:
+    """Return how high the lowest point of a disc is that rolls over a profile, m, shape (T, 2)."""
+    reach = int(radius / FINE)
+    lift = radius - np.sqrt(radius**2 - (FINE * np.arange(-reach, reach + 1)) ** 2)
+    around = np.pad(heights, ((reach, reach), (0, 0)), mode="edge")
+    highest = np.full_like(heights, -np.inf)
+    for k, gap in enumerate(lift):
+        np.maximum(highest, around[k : k + len(heights)] - gap, out=highest)
+    return highest
 
 
 def _footprint(length: float) -> Array:
-    """Return how a wheel weighs the ground under its footprint: Hertz's pressure of a line contact, semi-elliptic."""
-    reach = int(length / 2.0 / STEP)
-    place = STEP * np.arange(-reach, reach + 1)
-    pressure = np.sqrt(np.maximum(1.0 - (2.0 * place / length) ** 2, 0.0)) if reach else np.ones(1)
-    return np.asarray(pressure / pressure.sum())
+    """Return the even weights of the points of a footprint, which ends at the outermost two."""
+    reach = round(length / 2.0 / FINE)
+    weights = np.ones(2 * reach + 1)
+    if reach:
+        weights[[0, -1]] = 0.5
+    return np.asarray(weights / weights.sum())
 
 
 def _rough(count: int, roughness: Roughness, rng: np.random.Generator) -> Array:

@@ -1,7 +1,7 @@
 """A robot's body on its tyres: the ground under four wheels heaves, pitches and rolls it about its path.
 
-Each of the three is a mass on a spring and a damper whose foot is the plane through the wheels. The robot drives along
-a smooth path p; the body b is displaced from it by the heave along p's z axis and turned by pitch, then roll.
+The robot drives along a smooth path p; the body b is displaced from it by the heave along p's z axis and turned by
+pitch, then roll. What the tyres do is in `tyres`.
 """
 
 from __future__ import annotations
@@ -14,28 +14,12 @@ from numpy.typing import NDArray
 
 from polyins.simulation.path import Motion, Path
 from polyins.simulation.road import Ground
-from polyins.simulation.transmission import transmit
+from polyins.simulation.tyres import Suspension, bounce
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Suspension:
-    """Four wheels and the springs between them and the body."""
-
-    wheelbase: float
-    """m"""
-    track: float
-    """m"""
-    centre: Array
-    """between the wheels, in the array frame, m, shape (3,)"""
-    rates: Array
-    """natural frequencies of heave, pitch, roll, rad/s, shape (3,)"""
-    damping: float
-    """ratio, of all three"""
 
 
 @dataclass(frozen=True)
@@ -62,21 +46,11 @@ def shake(path: Path, ground: Ground, suspension: Suspension, step: float) -> Sh
     time = step * np.arange(np.ceil(path.duration / step) + 1.0)
     along = way(path, time)
     half = suspension.wheelbase / 2.0
-    front, rear = ground(along + half), ground(along - half)
-    feet = np.column_stack(
-        [
-            -(front + rear).mean(axis=1) / 2.0,
-            (front - rear).mean(axis=1) / suspension.wheelbase,
-            (front + rear) @ [0.5, -0.5] / suspension.track,
-        ]
-    )
-    moved = [
-        transmit(foot, step, rate, suspension.damping) for foot, rate in zip(feet.T, suspension.rates, strict=True)
-    ]
-    motion, change = (np.column_stack(columns) for columns in zip(*moved, strict=True))
+    gravity = float(path.world.gravity(path.position(np.zeros(1)))[0])
+    motion, change = bounce(np.hstack([ground(along + half), ground(along - half)]), step, suspension, gravity)
     for values in (motion, change):
-        # from the middle between the wheels to the array origin
-        values[:, 0] += suspension.centre[0] * values[:, 1] - suspension.centre[1] * values[:, 2]
+        # downwards, and from the middle between the wheels to the array origin
+        values[:, 0] = suspension.centre[0] * values[:, 1] - suspension.centre[1] * values[:, 2] - values[:, 0]
     return Shaking(step, motion, change)
 
 

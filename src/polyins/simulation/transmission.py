@@ -2,7 +2,7 @@
 
     y'' + 2 zeta w y' + w^2 y = 2 zeta w b' + w^2 b
 
-It is a robot's body on its tyres over the ground, and the tip of a ruler whose clamp shakes.
+It is the tip of a ruler whose clamp shakes.
 """
 
 from __future__ import annotations

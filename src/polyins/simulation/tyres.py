@@ -1,0 +1,113 @@
+"""A robot's body on four tyres that push and never pull.
+
+A tyre under wheel i is a spring and a damper between the ground g_i and the body's corner
+h_i = z + x_i pitch - y_i roll (heights upwards, y to the right). At rest it is pressed in by d_0. With
+d_i = d_0 + g_i - h_i its force over the body's mass is
+
+    f_i = max(0, k d_i + c d_i')  on the ground, d_i > 0,    f_i = 0  above it.
+
+The body obeys z'' = sum f_i - g, and likewise pitch and roll; k, c and the moments of inertia follow from the natural
+frequencies. While all wheels touch the ground this is linear: three oscillators whose feet are the plane that fits the
+ground under the wheels best. A wheel that the ground lets go falls with the body, no faster than gravity has it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.kernels.jit import kernel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Suspension:
+    """Four wheels and the tyres between the ground and the body."""
+
+    wheelbase: float
+    """m"""
+    track: float
+    """m"""
+    centre: Array
+    """between the wheels, in the array frame, m, shape (3,)"""
+    rates: Array
+    """natural frequencies of heave, pitch, roll, rad/s, shape (3,)"""
+    damping: float
+    """ratio, of the heave; of the others it grows with their frequency, as the tyres are the same"""
+
+    def arms(self) -> Array:
+        """Return by how much each mode lifts each corner, front left, right, rear left, right, shape (3, 4)."""
+        x, y = self.wheelbase / 2.0, self.track / 2.0
+        return np.array([[1.0, 1.0, 1.0, 1.0], [x, x, -x, -x], [y, -y, y, -y]])
+
+
+def bounce(ground: Array, step: float, suspension: Suspension, gravity: float) -> tuple[Array, Array]:
+    """Return heave upwards, m, pitch and roll, rad, shape (T, 3), and their derivatives over rough ground.
+
+    `ground` has the heights under the four wheels, m, every `step` s, shape (T, 4), as in `Suspension.arms`; between
+    them they change evenly. At the first instant all is at rest. Runge and Kutta's fourth order.
+    """
+    arms = suspension.arms()
+    # equal tyres: of each mode the sum of squared arms, over its inertia, makes its natural frequency
+    acting = (suspension.rates**2 / (arms**2).sum(axis=1))[:, None] * arms / suspension.rates[0] ** 2
+    stiffness, drag = suspension.rates[0] ** 2, 2.0 * suspension.damping * suspension.rates[0]
+    tyre = np.array([stiffness, drag, gravity / stiffness, gravity])
+    motion, change = np.zeros((len(ground), 3)), np.zeros((len(ground), 3))
+    motion[0] = arms @ ground[0] / (arms**2).sum(axis=1)
+    _bounce(np.ascontiguousarray(ground), step, arms, acting, tyre, motion, change)
+    return motion, change
+
+
+@kernel
+def _bounce(ground: Array, step: float, arms: Array, acting: Array, tyre: Array, motion: Array, change: Array) -> None:
+    """Fill motion and change from their first row."""
+    slopes, place, speed = np.empty((4, 6)), np.empty(3), np.empty(3)
+    for k in range(1, len(ground)):
+        for stage in range(4):
+            ahead = (0.0, 0.5, 0.5, 1.0)[stage]
+            for i in range(3):
+                before = max(stage - 1, 0)
+                place[i] = motion[k - 1, i] + ahead * step * slopes[before, i] if stage else motion[k - 1, i]
+                speed[i] = change[k - 1, i] + ahead * step * slopes[before, 3 + i] if stage else change[k - 1, i]
+            _accelerate(ground[k - 1], ground[k], ahead, step, arms, acting, tyre, place, speed, slopes[stage])
+        for i in range(3):
+            motion[k, i] = motion[k - 1, i] + step * _mean(slopes, i)
+            change[k, i] = change[k - 1, i] + step * _mean(slopes, 3 + i)
+
+
+@kernel
+def _mean(slopes: Array, i: int) -> float:
+    """Return the mean slope of the step."""
+    return float(slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i]) / 6.0
+
+
+@kernel
+def _accelerate(
+    before: Array,
+    after: Array,
+    ahead: float,
+    step: float,
+    arms: Array,
+    acting: Array,
+    tyre: Array,
+    place: Array,
+    speed: Array,
+    slope: Array,
+) -> None:
+    """Write the derivatives of place and speed with the ground a part `ahead` of the step on."""
+    for i in range(3):
+        slope[i], slope[3 + i] = speed[i], 0.0
+    slope[3] = -tyre[3]
+    for wheel in range(4):
+        pressed = tyre[2] + before[wheel] + ahead * (after[wheel] - before[wheel])
+        pressing = (after[wheel] - before[wheel]) / step
+        for i in range(3):
+            pressed -= arms[i, wheel] * place[i]
+            pressing -= arms[i, wheel] * speed[i]
+        if pressed > 0.0:
+            force = max(0.0, tyre[0] * pressed + tyre[1] * pressing)
+            for i in range(3):
+                slope[3 + i] += acting[i, wheel] * force
