@@ -187,6 +187,29 @@ def _compare(
 
 @cli.command()
 @click.argument("config", type=FILE)
+@click.option("--source", "sources", multiple=True, help="replay:, -, udp://, tcp://, serial://, gpsd://, mavlink://")
+@click.option("--sink", "sinks", multiple=True, help="ndjson:, nmea+tcp://, nmea+udp://; each takes ?rate=HZ.")
+@click.option("--method", default=None, help="A method for arrays; unless given enav-fusion, single with one IMU.")
+@click.option("--speed", default="1", show_default=True, help="Of a replay: times real speed, or max.")
+@click.option("--rate", "rate_hz", default=10.0, show_default=True, help="States per second for sinks and log, Hz.")
+@click.option("--delay", default=0.5, show_default=True, help="How late an epoch may be, s.")
+@click.option("--page", default=None, type=int, help="Show a page in the browser at this port; 0: any free one.")
+@click.option("--bind", default="127.0.0.1", show_default=True, help="The address at which the page is served.")
+@click.option("--checkpoint-every", default=10.0, show_default=True, help="Seconds between checkpoints; 0: none.")
+@click.option("--resume", is_flag=True, help="Go on from the checkpoint in --out, if there is one.")
+@out_option("polyins-live")
+def live(config: Path, sources: tuple[str, ...], sinks: tuple[str, ...], speed: str, **options: Any) -> None:
+    """Navigate on live data, or on a recording as if it were live, until the data end or Ctrl-C."""
+    from polyins.live import run
+
+    sources, sinks = sources or run.Options.sources, sinks or run.Options.sinks
+    settings = run.Options(config, sources=sources, sinks=sinks, speed=run.parse_speed(speed), **options)
+    summary = run.run(settings)
+    say(f"{summary['stopped_by']}: {summary['status']}; files: {settings.out}")
+
+
+@cli.command()
+@click.argument("config", type=FILE)
 @click.option("--out", type=FILE, default=None, help="File for the configuration; CONFIG's name and -calibrated.")
 @as_json_option
 def calibrate(config: Path, out: Path | None, as_json: bool) -> None:

@@ -12,7 +12,7 @@ from polyins import datasets
 from polyins.config import Config, Rolling, parse
 from polyins.errors import InputError
 from polyins.io import checks, clocks, faults, kf_gins_configuration, wheel_checks, wheel_ins_configuration
-from polyins.io.imu_stream import read_imu
+from polyins.io.imu_stream import as_mounted, read_imu
 from polyins.io.position_stream import read_gnss, read_reference
 from polyins.io.timing import outage_intervals, start_options
 from polyins.io.yaml_document import Document, read_yaml, write_yaml
@@ -110,10 +110,8 @@ def assemble(
     if config.start.position:
         geodetic = _one_kind(geodetic, config.start.position.geodetic, document.place(["start", "position"]))
     start, texts = start_options(config.start, document, span)
-    with document.at(["gnss", "antenna_position_m"]):
-        rig = Rig(imus, np.array(config.gnss.antenna_position_m) if config.gnss else np.zeros(3))
     return Recording(
-        rig,
+        _rig(config, document, imus),
         streams,
         gnss,
         reference,
@@ -185,7 +183,9 @@ def _one_kind(known: bool | None, new: bool, place: str) -> bool:
 
 def _with_absolute_paths(config: Config, folder: Path, path: Path) -> Config:
     def absolute(entry: Any) -> Any:
-        return entry and entry.model_copy(update={"file": str(folder / Path(entry.file).expanduser())})
+        if not entry or not entry.file:
+            return entry
+        return entry.model_copy(update={"file": str(folder / Path(entry.file).expanduser())})
 
     changes = {
         "name": config.name or path.stem,

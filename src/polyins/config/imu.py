@@ -171,8 +171,8 @@ class ImuEntry(ImuSettings):
 
     name: str = ""
     """a name of its own; imu1, imu2, ... if not given"""
-    file: str
-    """where its data are"""
+    file: str = ""
+    """where its data are; `polyins live` needs it for a replay only, all else always"""
 
 
 def _right_handed(axes: tuple[str, str, str]) -> bool:

@@ -24,8 +24,8 @@ class GeodeticPoint(Section):
 class GnssEntry(Section):
     """The positions that aid the filter."""
 
-    file: str
-    """where the data are"""
+    file: str = ""
+    """where the data are; `polyins live` needs it for a replay only, all else always"""
     format: Literal["auto", "kf-gins", "rtklib-pos", "table"] = "auto"
     """of the file; auto: found from its content"""
     columns: TrackColumns | None = None

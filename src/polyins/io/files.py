@@ -28,6 +28,13 @@ def find(path: str | Path) -> Path:
     raise InputError(f"{path}: no such file; expected it there, plain or as {packed.name}")
 
 
+def find_named(name: str) -> Path:
+    """Return the path of a file that a configuration names; raises InputError as `find` does, and for no name."""
+    if not name:
+        raise InputError("is missing; expected the name of a file")
+    return find(name)
+
+
 def read_bytes(path: str | Path) -> bytes:
     """Return the content of a file, unpacked if its name ends in `.gz`.
 

@@ -11,7 +11,7 @@ from polyins.config import ImuEntry, InitialErrors, InitialStd, Noise
 from polyins.errors import InputError
 from polyins.io import checks, kf_gins, table, xsens_dot
 from polyins.io.faults import clipped, without_faults
-from polyins.io.files import find
+from polyins.io.files import find_named
 from polyins.io.recognize import imu_format
 from polyins.io.rows import ImuRows, intervals, without
 from polyins.io.wheel_mount import wheel, wheel_rotation
@@ -31,7 +31,7 @@ def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuS
     Raises InputError for data and settings that cannot be right.
     """
     with document.at(["imus", index, "file"]):
-        find(entry.file)
+        find_named(entry.file)
     rows, saturated = _within_range(_rows(entry, document.place(["imus", index])), entry)
     warnings = (*_checked(rows, entry), *saturated)
     rows, faults = without_faults(rows, entry.name, entry.clock_offset_s)

@@ -12,7 +12,7 @@ from polyins.config import GnssEntry, ReferenceEntry
 from polyins.errors import InputError
 from polyins.geodesy import displacement
 from polyins.io import checks, kf_gins, rtklib, table
-from polyins.io.files import find
+from polyins.io.files import find_named
 from polyins.io.guess import read_stream
 from polyins.io.recognize import data_format, track_format
 from polyins.io.rows import Track
@@ -27,7 +27,7 @@ Span = tuple[float, float]
 def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) -> tuple[Track, list[str]]:
     """Read and check positions, heights above the ellipsoid, stamps on the recording's clock."""
     with document.at([section, "file"]):
-        find(entry.file)
+        find_named(entry.file)
     kind: str = entry.format
     if kind == "auto":
         kind = "table" if entry.columns else track_format(entry.file)

@@ -1,0 +1,96 @@
+"""Datagrams over UDP, refused by kind where they are not what they should be."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+
+from polyins.live import lines
+from polyins.live.events import Epoch, RefusedError
+from polyins.live.front import Front
+from polyins.live.source import POLL
+
+LONGEST = 8192
+"""bytes of a datagram"""
+BUFFER = 4 * 1024 * 1024
+"""bytes that the system is asked to keep while the program is busy"""
+AT_ONCE = 256
+"""datagrams in a chunk at most"""
+SO_RXQ_OVFL = 40
+"""Linux: tell with each datagram how many were lost because the buffer was full"""
+
+Parser = Callable[[bytes, Counter[str]], list[Epoch]]
+
+
+def lines_of(datagram: bytes, counts: Counter[str]) -> list[Epoch]:
+    """Return the epochs of a datagram of lines; what is refused is counted by kind."""
+    epochs = []
+    for line in datagram.splitlines():
+        try:
+            epochs.append(lines.parse(line))
+        except RefusedError as error:
+            counts[str(error)] += 1
+    return epochs
+
+
+class Datagrams:
+    """A bound socket and what its datagrams say."""
+
+    def __init__(self, url: str, address: tuple[str, int], parse: Parser) -> None:
+        self.url = url
+        self.counts: Counter[str] = Counter()
+        self.parse = parse
+        self.front = Front(self.counts)
+        self.stopped = False
+        self.socket = socket.socket(socket.AF_INET6 if ":" in address[0] else socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        if sys.platform == "linux":
+            self.socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+        self.socket.bind(address)
+
+    def chunks(self) -> Iterator[list[Epoch]]:
+        """Yield what has come, as `Source` says."""
+        with self.socket:
+            while not self.stopped:
+                datagrams = self._received()
+                yield self.taken(datagrams, time.monotonic())
+            yield self.front.release(time.monotonic())
+
+    def stop(self) -> None:
+        """Let `chunks` end."""
+        self.stopped = True
+
+    def taken(self, datagrams: list[bytes], now: float) -> list[Epoch]:
+        """Return what datagrams say that arrived at `now`, s, on a steady clock."""
+        epochs = []
+        for datagram in datagrams:
+            if len(datagram) > LONGEST:
+                self.counts["oversized"] += 1
+            elif not datagram.strip():
+                self.counts["malformed"] += 1
+            else:
+                epochs += self.parse(datagram, self.counts)
+        return self.front.admit(epochs, now)
+
+    def _received(self) -> list[bytes]:
+        """Wait for a datagram and return it with those that are there already."""
+        datagrams: list[bytes] = []
+        self.socket.settimeout(POLL)
+        try:
+            while len(datagrams) < AT_ONCE:
+                datagram, extra, _, _ = self.socket.recvmsg(LONGEST + 1, 64)
+                datagrams.append(datagram)
+                self._count_lost(extra)
+                self.socket.settimeout(0.0)
+        except (TimeoutError, BlockingIOError):
+            pass
+        return datagrams
+
+    def _count_lost(self, extra: list[tuple[int, int, bytes]]) -> None:
+        for level, kind, value in extra:
+            if level == socket.SOL_SOCKET and kind == SO_RXQ_OVFL:
+                self.counts["lost before they were read"] = struct.unpack("I", value)[0]

@@ -1,0 +1,57 @@
+"""Stamps against the receiving clock: a sensor's time cannot run ahead of the time in which its data arrive."""
+
+from __future__ import annotations
+
+from collections import Counter
+from statistics import median
+
+from polyins.live.events import Epoch
+
+AHEAD = 0.4
+"""s by which a stamp may be ahead of the newest before it and the time since then"""
+DECAY = 0.1
+"""s per s by which the front falls back: what one wrong stamp below AHEAD moved, good ones set right again"""
+FIRST_EPOCHS = 100
+FIRST_SECONDS = 1.0
+"""The first stamps are judged together, when so many are there or so much time has passed: one that is wrong could
+otherwise be the one that all others are judged by."""
+
+
+class Front:
+    """How far the stamps of one source have come."""
+
+    def __init__(self, counts: Counter[str]) -> None:
+        self.counts = counts
+        self.held: list[Epoch] = []
+        self.since = 0.0
+        """when the first of the held epochs, or the newest that was admitted, arrived, s"""
+        self.lead: float | None = None
+        """stamp less arrival where the front is, s"""
+
+    def admit(self, epochs: list[Epoch], now: float) -> list[Epoch]:
+        """Return the epochs that are not from the future; `now`: their arrival, s, on any steady clock."""
+        if self.lead is None:
+            if not self.held:
+                self.since = now
+            self.held += epochs
+            if not self.held or (len(self.held) < FIRST_EPOCHS and now - self.since < FIRST_SECONDS):
+                return []
+            epochs = self.release(now)
+        return [epoch for epoch in epochs if self._possible(epoch.time, now)]
+
+    def release(self, now: float) -> list[Epoch]:
+        """Return the epochs that are still held; the front starts from the middle of them."""
+        epochs, self.held = self.held, []
+        if epochs:
+            self.lead, self.since = median(epoch.time for epoch in epochs) - now, now
+        return epochs
+
+    def _possible(self, time: float, now: float) -> bool:
+        assert self.lead is not None
+        if time - now > self.lead + AHEAD:
+            self.counts["future-stamped"] += 1
+            return False
+        fallen = self.lead - min(DECAY * (now - self.since), 0.5 * AHEAD)
+        if time - now >= fallen:
+            self.lead, self.since = time - now, now
+        return True

@@ -1,0 +1,67 @@
+"""The edge: from what a sensor says, in its axes and on its clock, to the array's axes and the recording's clock."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from polyins.config import Config
+from polyins.geodesy import displacement
+from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError
+from polyins.rig import DEG, Rig
+
+
+class Intake:
+    """What a configuration says of mounts, clocks, heights and accuracies, applied to one epoch at a time."""
+
+    def __init__(self, config: Config, rig: Rig, geodetic: bool) -> None:
+        self.rotations = {imu.name: _unless_identity(imu.rotation) for imu in rig.imus}
+        self.offsets = {entry.name: entry.clock_offset_s for entry in config.imus}
+        self.gnss = config.gnss
+        self.geodetic = geodetic
+
+    def taken(self, epoch: Epoch) -> Epoch:
+        """Return the epoch as the navigator wants it; raises RefusedError with the kind of what is wrong."""
+        return self._imu(epoch) if isinstance(epoch, ImuEpoch) else self._fix(epoch)
+
+    def _imu(self, epoch: ImuEpoch) -> ImuEpoch:
+        if epoch.imu not in self.rotations:
+            raise RefusedError("unknown IMU")
+        rotation, time = self.rotations[epoch.imu], epoch.time + self.offsets[epoch.imu]
+        if rotation is None:
+            return epoch._replace(time=time)
+        return ImuEpoch(epoch.imu, time, rotation @ epoch.dtheta, rotation @ epoch.dvel)
+
+    def _fix(self, fix: GnssEpoch) -> GnssEpoch:
+        entry = self.gnss
+        if entry is None:
+            raise RefusedError("GNSS without a gnss section")
+        std = fix.position_std if entry.position_std_m is None else np.array(entry.position_std_m)
+        if std is None:
+            raise RefusedError("GNSS without std")
+        time = fix.time + entry.clock_offset_s
+        position = self._placed(self._above_ellipsoid(fix), fix.geodetic)
+        has_velocity = fix.velocity is not None and fix.velocity_std is not None
+        velocity = (fix.velocity, fix.velocity_std) if has_velocity else (None, None)
+        return GnssEpoch(time, position, std, *velocity, geodetic=self.geodetic)
+
+    def _above_ellipsoid(self, fix: GnssEpoch) -> Array:
+        assert self.gnss is not None
+        if not fix.geodetic or not (fix.above_sea or self.gnss.height == "sea-level"):
+            return fix.position
+        if self.gnss.geoid_height_m is None:
+            raise RefusedError("height above the sea without geoid_height_m")
+        return np.asarray(fix.position + np.array([0.0, 0.0, self.gnss.geoid_height_m]))
+
+    def _placed(self, position: Array, geodetic: bool) -> Array:
+        """Return the position in the kind that the filter has."""
+        origin = None if self.gnss is None else self.gnss.plane_origin
+        if geodetic and origin is not None:
+            point = np.array([origin.latitude_deg * DEG, origin.longitude_deg * DEG, origin.height_m])
+            return np.asarray(displacement(position[None, :], point, True)[0] * [1.0, 1.0, -1.0])
+        if geodetic != self.geodetic:
+            raise RefusedError("position of another kind")
+        return position
+
+
+def _unless_identity(rotation: Array) -> Array | None:
+    return None if np.array_equal(rotation, np.eye(3)) else rotation

@@ -1,0 +1,68 @@
+"""NMEA 0183 sentences of a state: GGA, RMC, HDT, talker IN (integrated navigation)."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+
+from polyins.live.lines import checksum
+from polyins.live.snapshot import Snapshot
+
+UNIX_TIME = 1e9
+"""Stamps above this are seconds of Unix time; below, only their time of day is told."""
+DAY = 86400.0
+KNOT = 1852.0 / 3600.0
+FIX, ESTIMATED = 1, 6
+"""GGA quality"""
+
+
+def sentences(snapshot: Snapshot, geoid_height: float | None = None) -> list[str]:
+    """Return GGA, RMC and HDT with checksums and line ends.
+
+    In dead reckoning GGA's quality is 6 and RMC's mode E, its status V. The height above the sea is empty unless the
+    height of the geoid above the ellipsoid, m, is known.
+    """
+    row = snapshot.row
+    time, date = _time_and_date(snapshot.state.time)
+    place = f"{_angle(row['latitude_deg'] or 0.0, 2, 'NS')},{_angle(row['longitude_deg'] or 0.0, 3, 'EW')}"
+    quality = ESTIMATED if snapshot.dead_reckoning else FIX
+    mode, status = ("E", "V") if snapshot.dead_reckoning else ("A", "A")
+    north, east = row["north_velocity_m_s"] or 0.0, row["east_velocity_m_s"] or 0.0
+    speed, course = math.hypot(north, east) / KNOT, math.degrees(math.atan2(east, north)) % 360.0
+    return [
+        sentence(f"INGGA,{time},{place},{quality},,,{_height(row['height_m'] or 0.0, geoid_height)},,"),
+        sentence(f"INRMC,{time},{status},{place},{speed:.2f},{_turned(course)},{date},,,{mode}"),
+        sentence(f"INHDT,{_turned(row['heading_deg'] or 0.0)},T"),
+    ]
+
+
+def sentence(body: str) -> str:
+    """Return a body with dollar sign, checksum and line end."""
+    return f"${body}*{checksum(body.encode()):02X}\r\n"
+
+
+def _height(height: float, geoid_height: float | None) -> str:
+    """Return the height above the sea and that of the geoid, as far as they are known."""
+    return ",M,,M" if geoid_height is None else f"{height - geoid_height:.2f},M,{geoid_height:.2f},M"
+
+
+def _turned(angle: float) -> str:
+    """Return an angle, deg, which rounding does not bring to 360."""
+    return f"{round(angle, 2) % 360.0:.2f}"
+
+
+def _time_and_date(stamp: float) -> tuple[str, str]:
+    stamp = round(stamp, 2)
+    if stamp >= UNIX_TIME:
+        at = datetime.fromtimestamp(stamp, UTC)
+        return f"{at:%H%M%S}.{at.microsecond // 10000:02d}", f"{at:%d%m%y}"
+    hundredths = round(stamp % DAY * 100)
+    minutes, rest = divmod(hundredths % int(DAY * 100), 6000)
+    return f"{minutes // 60:02d}{minutes % 60:02d}{rest // 100:02d}.{rest % 100:02d}", ""
+
+
+def _angle(degrees: float, digits: int, letters: str) -> str:
+    """Return degrees and minutes to 1e-6 minutes, which is 2 mm, with the letter of the hemisphere."""
+    degrees = (degrees + 180.0) % 360.0 - 180.0
+    whole, part = divmod(round(abs(degrees) * 60e6), 60_000_000)
+    return f"{whole:0{digits}d}{part // 1_000_000:02d}.{part % 1_000_000:06d},{letters[degrees < 0.0]}"

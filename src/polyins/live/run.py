@@ -1,0 +1,282 @@
+"""`polyins live`: sources, session and sinks put together, until the data end or a signal comes."""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polyins import __version__, loading, results
+from polyins.alignment import Start
+from polyins.config import Config
+from polyins.errors import InputError
+from polyins.io.yaml_document import Document
+from polyins.live.events import Epoch, RefusedError
+from polyins.live.inbox import Inbox
+from polyins.live.intake import Intake
+from polyins.live.page import RATE_HZ as PAGE_RATE_HZ
+from polyins.live.page import Page
+from polyins.live.replay import Replay
+from polyins.live.session import Checkpoints, Session
+from polyins.live.sinks import Outlet, ParquetLog, open_sink
+from polyins.live.source import POLL, Source, open_source
+from polyins.live.starter import Starter
+from polyins.recording import Recording
+from polyins.screen import announce_compilation, say
+
+if TYPE_CHECKING:
+    from polyins.navigator import Navigator
+
+REPLAY = "replay:"
+TOLD = 5.0  # s, at least, between two messages on what is missing for a start
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line says."""
+
+    config: Path
+    out: Path
+    sources: tuple[str, ...] = (REPLAY,)
+    sinks: tuple[str, ...] = ("ndjson:",)
+    method: str | None = None
+    speed: float = 1.0
+    rate_hz: float = 10.0
+    delay: float = 0.5
+    page: int | None = None
+    bind: str = "127.0.0.1"
+    checkpoint_every: float = 10.0
+    resume: bool = False
+
+
+def parse_speed(text: str) -> float:
+    """Return a replay's speed, a number or max; raises InputError for anything else."""
+    if text == "max":
+        return math.inf
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not 0.0 < speed < math.inf:
+        raise InputError(f"--speed {text}: expected a number above 0, or max")
+    return speed
+
+
+def run(options: Options) -> dict[str, Any]:
+    """Navigate until the data end or SIGINT or SIGTERM comes; returns the summary, which is also written.
+
+    Raises InputError for a configuration, source or sink that cannot be right, and for data that end without a start.
+    """
+    config, document, warnings = loading.read_config(options.config)
+    recording, notes = _recording(options, config, document)
+    method = options.method or ("enav-fusion" if len(recording.rig.imus) > 1 else "single")
+    results.make_folder(options.out)
+    announce_compilation()
+    session = _session(options, config, recording, method)
+    with _stop_signals() as stopped:
+        live = Live(session, _sources(options, config, recording, session), stopped)
+        live.open_outlets(options, method, config)
+        live.run()
+    summary = live.summary(method, (*warnings, *notes))
+    results.write_document(options.out / "summary.json", summary)
+    if session.navigator is None and not live.stopped_by:
+        raise InputError(f"{options.config}: the data ended without a start: {session.starter.why}")
+    return summary
+
+
+class Live:
+    """Threads that read, one that navigates."""
+
+    def __init__(self, session: Session, sources: Sequence[tuple[Source, Intake | None]], stopped: list[str]) -> None:
+        self.session = session
+        self.sources = sources
+        self.signals = stopped
+        self.stopped_by = ""
+        self.page: Page | None = None
+        self.files: list[Path] = []
+        self.inbox = Inbox(len(sources))
+        self.told = (0.0, "")
+
+    def open_outlets(self, options: Options, method: str, config: Config) -> None:
+        """Open sinks, log and page."""
+        outlets: list[Outlet] = []
+        geoid = config.gnss.geoid_height_m if config.gnss else None
+        geodetic = self.session.starter.blank.geodetic
+        self.session.outlets = outlets
+        log = _free(options.out / "solution.parquet") if options.resume else options.out / "solution.parquet"
+        self.files.append(log)
+        outlets.append(Outlet(ParquetLog(log, {"method": method}), options.rate_hz))
+        outlets.extend(open_sink(url, options.rate_hz, geodetic, geoid) for url in options.sinks)
+        if options.page is not None:
+            self.page = Page(options.bind, options.page, self.report)
+            outlets.append(Outlet(self.page, PAGE_RATE_HZ))
+            say(f"page: {self.page.url}")
+
+    def run(self) -> None:
+        """Take epochs until none can come any more, or until a signal; what has come by then is taken."""
+        threads = [threading.Thread(target=self._pump, args=pair, daemon=True) for pair in self.sources]
+        for thread in threads:
+            thread.start()
+        try:
+            while not self.signals and (epochs := self.inbox.take(POLL)) is not None:
+                self._take(epochs)
+            self.stopped_by = self.signals[0] if self.signals else ""
+            self._take(self.inbox.take(0.0) or [])
+            self.session.finish()
+        except BrokenPipeError:
+            self.stopped_by = "end of standard output"
+            self.session.finish()
+        finally:
+            self._close()
+
+    def _take(self, epochs: list[Epoch]) -> None:
+        for epoch in epochs:
+            self.session.take(epoch)
+        if self.session.navigator is None:
+            self._tell_what_is_missing()
+
+    def _tell_what_is_missing(self) -> None:
+        why, now = self.session.starter.why, time.monotonic()
+        if self.page is not None:
+            self.page.tell()
+        if why != self.told[1] and now - self.told[0] > TOLD:
+            say(f"looking for a start: {why}")
+            self.told = now, why
+
+    def _pump(self, source: Source, intake: Intake | None) -> None:
+        try:
+            for epochs in source.chunks():
+                self.inbox.put(_admitted(epochs, source, intake))
+        finally:
+            self.inbox.source_ended()
+
+    def _close(self) -> None:
+        for source, _ in self.sources:
+            source.stop()
+        self.inbox.close()
+        for outlet in self.session.outlets:
+            outlet.sink.close()
+
+    def refused(self) -> Counter[str]:
+        """Return what was refused anywhere, by kind."""
+        counts = self.session.refused()
+        for source, _ in self.sources:
+            counts.update(source.counts)
+        return counts
+
+    def report(self) -> dict[str, Any]:
+        """Return how it goes, for the page."""
+        return {**self.session.report(), "refused": self.refused().total()}
+
+    def summary(self, method: str, warnings: Sequence[str]) -> dict[str, Any]:
+        """Return the document that is written at the end."""
+        session = self.session
+        names = [imu.name for imu in session.starter.blank.rig.imus]
+        report = session.report()
+        checkpoints = session.checkpoints.count if session.checkpoints else 0
+        return {
+            "polyins": __version__,
+            "method": method,
+            "sources": [source.url for source, _ in self.sources],
+            "stopped_by": self.stopped_by or "end of data",
+            "status": report["status"],
+            "start": session.start and {"time_s": session.start.time, **session.start.sources},
+            "end_s": session.last.state.time if session.last else None,
+            "epochs": {name: session.epochs[name] for name in names},
+            "fixes": session.epochs["GNSS"],
+            "refused": dict(sorted(self.refused().items())),
+            "imus": report.get("imus", []),
+            "checkpoints": checkpoints,
+            "files": [path.name for path in self.files if path.is_file()],
+            "warnings": list(warnings),
+        }
+
+
+def _admitted(epochs: list[Epoch], source: Source, intake: Intake | None) -> list[Epoch]:
+    if intake is None:
+        return epochs
+    admitted = []
+    for epoch in epochs:
+        try:
+            admitted.append(intake.taken(epoch))
+        except RefusedError as error:
+            source.counts[str(error)] += 1
+    return admitted
+
+
+def _recording(options: Options, config: Config, document: Document) -> tuple[Recording, tuple[str, ...]]:
+    """Return the recording to be replayed, or one without streams; and warnings."""
+    if REPLAY in options.sources:
+        recording = loading.build(config, document)
+        return recording, recording.warnings
+    return loading.without_data(config, document)
+
+
+def _session(options: Options, config: Config, recording: Recording, method: str) -> Session:
+    from polyins.navigator import Navigator
+
+    rig, delay = recording.rig, options.delay
+    needs_fix = recording.start.position is None and config.gnss is not None
+    settings = {"method": method, "options": recording.options, "geodetic": recording.geodetic, "delay": delay}
+    begin: Callable[[Start], Navigator] = partial(Navigator, rig, **settings)
+    starter = Starter(replace(recording, imus=(), gnss=None), delay, needs_fix)
+    every = options.checkpoint_every or math.inf
+    checkpoints = Checkpoints(options.out, every)
+    session = Session(starter, begin, (), checkpoints)
+    if options.resume and checkpoints.path.is_file():
+        session.resume(Navigator.resume(checkpoints.path), np.load(checkpoints.origin_path))
+        say(f"going on from {checkpoints.path}")
+    return session
+
+
+def _sources(
+    options: Options, config: Config, recording: Recording, session: Session
+) -> list[tuple[Source, Intake | None]]:
+    names = tuple(imu.name for imu in recording.rig.imus)
+    intake = Intake(config, recording.rig, recording.geodetic)
+    after = -math.inf
+    if session.navigator is not None and session.navigator.state is not None:
+        after = session.navigator.state.time - 2.0 * options.delay
+    return [
+        (Replay(recording, options.speed, after), None) if url == REPLAY else (open_source(url, names), intake)
+        for url in options.sources
+    ]
+
+
+def _free(path: Path) -> Path:
+    """Return the path, or the first one with a number that is free."""
+    number = 2
+    free = path
+    while free.exists():
+        free = path.with_stem(f"{path.stem}-{number}")
+        number += 1
+    return free
+
+
+@contextmanager
+def _stop_signals() -> Iterator[list[str]]:
+    """Collect the names of SIGINT and SIGTERM instead of dying of them."""
+    received: list[str] = []
+
+    def note(number: int, frame: object) -> None:
+        received.append(signal.Signals(number).name)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield received
+        return
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

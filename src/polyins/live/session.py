@@ -1,0 +1,182 @@
+"""One run on live epochs: start, navigate, pass states on, keep checkpoints."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polyins.alignment import Start
+from polyins.io.files import write_bytes
+from polyins.live.events import Array, Epoch, ImuEpoch
+from polyins.live.sinks import Outlet
+from polyins.live.snapshot import Snapshot
+from polyins.live.starter import Starter
+
+if TYPE_CHECKING:
+    from polyins.navigator import Navigator, NavigatorState
+
+SILENT_GNSS = 2.0
+"""s without a fix that are dead reckoning; at least, and 2.5 times the usual interval"""
+LONGEST_LAG = 1.0
+"""s by which a state is taken to follow the stamp of what has come"""
+
+
+class Checkpoints:
+    """The navigator in a file, whole at any time, and what the session has to know besides."""
+
+    def __init__(self, folder: Path, every: float) -> None:
+        """`every`: s of data between two; infinite: none."""
+        self.path = folder / "checkpoint.npz"
+        self.origin_path = folder / "origin.npy"
+        self.every = every
+        self.due = float("-inf")
+        self.count = 0
+
+    def offer(self, navigator: Navigator, time: float) -> None:
+        """Save the navigator if it is due."""
+        if time >= self.due:
+            if self.due > float("-inf"):
+                navigator.save(self.path)
+                self.count += 1
+            self.due = time + self.every
+
+
+class Session:
+    """Takes epochs in the order of their arrival."""
+
+    def __init__(
+        self,
+        starter: Starter,
+        begin: Callable[[Start], Navigator],
+        outlets: Sequence[Outlet],
+        checkpoints: Checkpoints | None = None,
+    ) -> None:
+        self.starter = starter
+        self.begin = begin
+        self.outlets = outlets
+        self.checkpoints = checkpoints
+        self.index = {imu.name: i for i, imu in enumerate(starter.blank.rig.imus)}
+        self.navigator: Navigator | None = None
+        self.start: Start | None = None
+        self.origin: Array | None = None
+        self.epochs: Counter[str] = Counter()
+        """what was fed to the navigator, by IMU, and fixes as GNSS"""
+        self.fix_times: deque[float] = deque(maxlen=6)
+        self.due = float("-inf")
+        """s: a state is looked at when a stamp has come that far"""
+        self.last: Snapshot | None = None
+
+    def resume(self, navigator: Navigator, origin: Array) -> None:
+        """Go on with a navigator from a checkpoint instead of looking for a start."""
+        self.navigator, self.origin = navigator, origin
+
+    def take(self, epoch: Epoch) -> None:
+        """Take the next epoch."""
+        if self.navigator is not None:
+            self._feed(epoch)
+        elif (found := self.starter.take(epoch)) is not None:
+            self.start, collected = found
+            self.navigator = self.begin(self.start)
+            self.fix_times.append(self.start.time)  # what the start knows, a fix would have said
+            for one in collected:
+                self._feed(one)
+
+    def finish(self) -> None:
+        """Let the navigator take what still waits, and pass the last state on."""
+        if self.navigator is None:
+            return
+        self.navigator.flush()
+        state = self.navigator.state
+        if state is not None and (self.last is None or state.time > self.last.state.time):
+            self._pass_on(state, last=True)
+        if self.checkpoints is not None and self.checkpoints.every < float("inf"):
+            self.navigator.save(self.checkpoints.path)
+
+    def _feed(self, epoch: Epoch) -> None:
+        assert self.navigator is not None
+        if isinstance(epoch, ImuEpoch):
+            self.epochs[epoch.imu] += 1
+            self.navigator.imu(epoch.time, epoch.dtheta, epoch.dvel, self.index[epoch.imu])
+        else:
+            assert epoch.position_std is not None
+            self.epochs["GNSS"] += 1
+            self.fix_times.append(epoch.time)
+            self.navigator.gnss(epoch.time, epoch.position, epoch.position_std, epoch.velocity, epoch.velocity_std)
+        if epoch.time >= self.due:
+            self._look(epoch.time)
+
+    def _look(self, time: float) -> None:
+        assert self.navigator is not None
+        state = self.navigator.state
+        if state is None or (self.last is not None and state.time <= self.last.state.time):
+            return
+        self._pass_on(state)
+        if self.checkpoints is not None:
+            self.checkpoints.offer(self.navigator, state.time)
+        lag = min(max(0.0, time - state.time), LONGEST_LAG)
+        self.due = lag + min((outlet.due for outlet in self.outlets), default=state.time + 1.0)
+
+    def _pass_on(self, state: NavigatorState, last: bool = False) -> None:
+        if self.origin is None:
+            self.origin = np.array(state.position)
+            if self.checkpoints is not None:
+                _keep_origin(self.checkpoints.origin_path, self.origin)
+        geodetic = self.starter.blank.geodetic
+        self.last = Snapshot(state, self.origin, geodetic, self._dead_reckoning(state.time))
+        for outlet in self.outlets:
+            if last:
+                outlet.due = float("-inf")
+            outlet.offer(self.last)
+
+    def _dead_reckoning(self, time: float) -> bool:
+        times = sorted(self.fix_times)
+        if not times:
+            return True
+        usual = median(np.diff(times)) if len(times) > 1 else 0.0
+        return bool(time - times[-1] > max(SILENT_GNSS, 2.5 * usual))
+
+    def report(self) -> dict[str, Any]:
+        """Return how it goes: state, health of each IMU, age of the last fix."""
+        if self.navigator is None or self.last is None:
+            return {"status": f"looking for a start: {self.starter.why}"}
+        return {
+            "status": "dead reckoning" if self.last.dead_reckoning else "navigating",
+            "state": self.last.row,
+            "imus": [_health(one) for one in self.navigator.health],
+            "fix_age_s": self.last.state.time - max(self.fix_times) if self.fix_times else None,
+        }
+
+    def refused(self) -> Counter[str]:
+        """Return what starter and navigator refused, by kind."""
+        counts = Counter(self.starter.counts)
+        if self.navigator is not None:
+            counts.update(self.navigator.counts)
+        return counts
+
+
+def _keep_origin(path: Path, origin: Array) -> None:
+    import io
+
+    content = io.BytesIO()
+    np.save(content, origin)
+    write_bytes(path, content.getvalue())
+
+
+def _health(one: Any) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "rate_hz": _number(one.rate_hz),
+        "gyro_residual_deg_s": _number(np.degrees(np.linalg.norm(one.gyro_residual))),
+        "accel_residual_m_s2": _number(np.linalg.norm(one.accel_residual)),
+        "last_time_s": _number(one.last_time),
+        "silent": bool(one.silent),
+    }
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)

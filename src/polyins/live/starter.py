@@ -1,0 +1,136 @@
+"""From nothing to a start: collect epochs until the search for a start succeeds on them."""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from polyins import alignment, timesync
+from polyins.alignment import Start
+from polyins.errors import InputError
+from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch
+from polyins.recording import GnssStream, ImuStream, Recording
+
+EVERY = 1.0
+"""s of data between two attempts"""
+KEPT = 120.0
+"""s of data that are kept: the longest standstill that is looked at, and as long again to move off"""
+CUT_EVERY = 10.0  # s
+
+
+@dataclass
+class _Rows:
+    """Rows of numbers, the stamp first, that grow at one end and are cut at the other."""
+
+    width: int
+    numbers: array[float] = field(default_factory=lambda: array("d"))
+    stamps: set[float] = field(default_factory=set)
+
+    def add(self, *row: float) -> None:
+        self.numbers.extend(row)
+        self.stamps.add(row[0])
+
+    def sorted(self) -> Array:
+        rows = np.array(self.numbers).reshape(-1, self.width)
+        return rows[np.argsort(rows[:, 0], kind="stable")]
+
+    def cut(self, before: float) -> None:
+        rows = self.sorted()
+        rows = rows[rows[:, 0] >= before]
+        self.numbers, self.stamps = array("d", rows.ravel()), set(rows[:, 0])
+
+
+class Starter:
+    """Collects epochs until `alignment.find_start` finds a start in them."""
+
+    def __init__(self, blank: Recording, delay: float, needs_fix: bool) -> None:
+        """`blank` says all but the streams; attempts wait for epochs that are late by up to `delay`, s.
+
+        `needs_fix`: the position is to come from GNSS.
+        """
+        self.blank = blank
+        self.delay = delay
+        self.needs_fix = needs_fix
+        self.counts: Counter[str] = Counter()
+        self.why = "no data"
+        """why there is no start yet"""
+        self.imus = {imu.name: _Rows(7) for imu in blank.rig.imus}
+        self.fixes = _Rows(13)
+        self.attempt: float | None = None
+        """s: data up to this time are looked at next"""
+
+    def take(self, epoch: Epoch) -> tuple[Start, list[Epoch]] | None:
+        """Take an epoch; returns the start, once it is found, and all that was collected in the order of stamps."""
+        rows = self.imus[epoch.imu] if isinstance(epoch, ImuEpoch) else self.fixes
+        if epoch.time in rows.stamps:
+            self.counts["duplicated"] += 1
+            return None
+        rows.add(*_row(epoch))
+        if self.attempt is None:
+            self.attempt = (epoch.time // EVERY + 1.0) * EVERY
+        if epoch.time < self.attempt + self.delay:
+            return None
+        until, self.attempt = self.attempt, self.attempt + EVERY
+        start = self._found(until)
+        if start is not None:
+            return start, self._collected()
+        if until % CUT_EVERY == 0.0:
+            for rows in (*self.imus.values(), self.fixes):
+                rows.cut(until - KEPT)
+        return None
+
+    def _found(self, until: float) -> Start | None:
+        try:
+            recording = self._recording(until)
+            return alignment.find_start(recording, timesync.align(recording.imus))
+        except InputError as error:
+            self.why = str(error)
+            return None
+
+    def _recording(self, until: float) -> Recording:
+        streams = []
+        for name, collected in self.imus.items():
+            rows = _until(collected, until)
+            if len(rows) < 2:
+                raise InputError(f"no data from {name}")
+            streams.append(ImuStream(name, rows[:, 0], rows[:, 1:4], rows[:, 4:7]))
+        gnss = self._gnss(until)
+        if gnss is None and self.needs_fix:
+            raise InputError("no fix from GNSS")
+        return replace(self.blank, imus=tuple(streams), gnss=gnss)
+
+    def _gnss(self, until: float) -> GnssStream | None:
+        rows = _until(self.fixes, until)
+        if not len(rows):
+            return None
+        # a velocity is looked at where every fix has one
+        velocities = (rows[:, 7:10], rows[:, 10:13]) if np.isfinite(rows).all() else (None, None)
+        return GnssStream(rows[:, 0], rows[:, 1:4], rows[:, 4:7], *velocities)
+
+    def _collected(self) -> list[Epoch]:
+        epochs: list[Epoch] = []
+        for name, collected in self.imus.items():
+            epochs += [ImuEpoch(name, float(row[0]), row[1:4], row[4:7]) for row in collected.sorted()]
+        for row in self.fixes.sorted():
+            velocity, velocity_std = (row[7:10], row[10:13]) if np.isfinite(row).all() else (None, None)
+            fix = GnssEpoch(float(row[0]), row[1:4], row[4:7], velocity, velocity_std, geodetic=self.blank.geodetic)
+            epochs.append(fix)
+        return sorted(epochs, key=lambda epoch: epoch.time)
+
+
+def _row(epoch: Epoch) -> tuple[float, ...]:
+    if isinstance(epoch, ImuEpoch):
+        return epoch.time, *epoch.dtheta, *epoch.dvel
+    assert epoch.position_std is not None
+    nothing = np.full(3, np.nan)
+    velocity = nothing if epoch.velocity is None else epoch.velocity
+    velocity_std = nothing if epoch.velocity_std is None else epoch.velocity_std
+    return epoch.time, *epoch.position, *epoch.position_std, *velocity, *velocity_std
+
+
+def _until(rows: _Rows, time: float) -> Array:
+    found = rows.sorted()
+    return found[found[:, 0] <= time]
