@@ -17,7 +17,7 @@ RATE_HZ = 10.0
 TRACK = 4000
 """points that a page which opens later is told of; every second one goes when there are more"""
 KEEP_ALIVE = 5.0  # s
-POLICY = "default-src 'self'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+POLICY = "default-src 'self'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
 class Page:

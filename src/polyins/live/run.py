@@ -105,7 +105,7 @@ class Live:
         self.page: Page | None = None
         self.files: list[Path] = []
         self.inbox = Inbox(len(sources))
-        self.told = (0.0, "")
+        self.told = (time.monotonic(), "")
 
     def open_outlets(self, options: Options, method: str, config: Config) -> None:
         """Open sinks, log and page."""

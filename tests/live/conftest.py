@@ -1,0 +1,56 @@
+"""A short drive of three IMUs, as a recording, as files and as datagrams."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from polyins import loading
+from polyins.io.yaml_document import read_yaml, write_yaml
+from polyins.live import lines
+from polyins.live.events import Epoch
+from polyins.live.replay import Replay
+from polyins.recording import Recording
+from polyins.simulation import files
+from polyins.simulation.scenario import Board, Scenario, simulate
+
+if importlib.util.find_spec("polyins.navigator") is None:
+    import fake_navigator
+
+    fake_navigator.install()
+
+
+@pytest.fixture(scope="session")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The configuration of a drive of 50 s, 8 of them at rest, with an outage."""
+    scenario = Scenario(duration_s=50.0, static_s=8.0, rate_hz=50.0, imus=Board(count=3), outages=((30.0, 36.0),))
+    return files.write(simulate(scenario, seed=5), tmp_path_factory.mktemp("drive"))
+
+
+@pytest.fixture(scope="session")
+def recording(drive: Path) -> Recording:
+    return loading.load(drive)
+
+
+@pytest.fixture(scope="session")
+def epochs(recording: Recording) -> list[Epoch]:
+    """All epochs in the order of their stamps, fixes in the outage withheld."""
+    return [epoch for chunk in Replay(recording).chunks() for epoch in chunk]
+
+
+@pytest.fixture(scope="session")
+def datagrams(epochs: list[Epoch]) -> list[bytes]:
+    return [lines.write(epoch).encode() for epoch in epochs]
+
+
+@pytest.fixture(scope="session")
+def no_files(drive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same configuration without the files, for data that come otherwise."""
+    values = read_yaml(drive).values
+    for key in ("reference", "outages"):
+        values.pop(key)
+    for entry in (*values["imus"], values["gnss"]):
+        entry.pop("file")
+    path = tmp_path_factory.mktemp("no-files") / "live.yaml"
+    path.write_text(write_yaml(values))
+    return path
