@@ -47,7 +47,7 @@ class Starter:
     """Collects epochs until `alignment.find_start` finds a start in them."""
 
     def __init__(self, blank: Recording, delay: float, needs_fix: bool) -> None:
-        """`blank` says all but the streams; attempts wait for epochs that are late by up to `delay`, s.
+        """`blank` says all but the streams; an epoch may be later than others by `delay`, s.
 
         `needs_fix`: the position is to come from GNSS.
         """
@@ -59,6 +59,7 @@ class Starter:
         """why there is no start yet"""
         self.imus = {imu.name: _Rows(7) for imu in blank.rig.imus}
         self.fixes = _Rows(13)
+        self.newest = float("-inf")
         self.attempt: float | None = None
         """s: data up to this time are looked at next"""
 
@@ -68,6 +69,10 @@ class Starter:
         if epoch.time in rows.stamps:
             self.counts["duplicated"] += 1
             return None
+        if epoch.time < self.newest - self.delay:
+            self.counts["late"] += 1
+            return None
+        self.newest = max(self.newest, epoch.time)
         rows.add(*_row(epoch))
         if self.attempt is None:
             self.attempt = (epoch.time // EVERY + 1.0) * EVERY
