@@ -29,7 +29,9 @@ def flood(good: list[bytes], seed: int) -> Iterator[tuple[str, bytes]]:
 
 def _damaged(line: bytes, chance: random.Random) -> bytes:
     cut = line[: chance.randrange(0, max(1, len(line) - 30))]
-    return chance.choice([b"", cut, chance.randbytes(60).hex().encode(), line.replace(b",", b";"), line + b",1,2", b"polyins1,x,1"])
+    return chance.choice(
+        [b"", cut, chance.randbytes(60).hex().encode(), line.replace(b",", b";"), line + b",1,2", b"polyins1,x,1"]
+    )
 
 
 def _restamped(line: bytes, by: float) -> bytes:

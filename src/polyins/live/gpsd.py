@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 
 from polyins.live.events import Array, GnssEpoch, RefusedError
+from polyins.live.lines import geodetic_position
 from polyins.rig import DEG
 
 PORT = 2947
 WATCH = b'?WATCH={"enable":true,"json":true};\n'
 LONGEST = 10240
 """bytes of a report, from the protocol"""
-SIGMAS_95 = 1.96
-"""gpsd's errors are of 95 % confidence in each component"""
+SIGMAS = 1.96
+"""gpsd's errors are of 95 % confidence, here in one component"""
+SIGMAS_2D = 2.45
+"""the same of the radius of a circle"""
 THREE_DIMENSIONS = 3
 
 
@@ -46,8 +49,8 @@ def _fix(report: dict[str, Any]) -> GnssEpoch:
     velocity, velocity_std = _velocity(report)
     return GnssEpoch(
         datetime.fromisoformat(report["time"]).timestamp(),
-        np.array([report["lat"] * DEG, report["lon"] * DEG, height], dtype=float),
-        _std(report, "epy", "epx", "epv"),
+        geodetic_position(report["lat"], report["lon"], height),
+        _position_std(report),
         velocity,
         velocity_std,
         above_sea="altHAE" not in report,
@@ -57,7 +60,16 @@ def _fix(report: dict[str, Any]) -> GnssEpoch:
 def _std(report: dict[str, Any], *names: str) -> Array | None:
     if any(not report.get(name) for name in names):
         return None
-    return np.array([report[name] / SIGMAS_95 for name in names], dtype=float)
+    return np.array([report[name] / SIGMAS for name in names], dtype=float)
+
+
+def _position_std(report: dict[str, Any]) -> Array | None:
+    """Return north, east, down from the errors of each, else of the horizontal circle."""
+    std = _std(report, "epy", "epx", "epv")
+    if std is not None or not report.get("eph") or not report.get("epv"):
+        return std
+    horizontal = report["eph"] / SIGMAS_2D
+    return np.array([horizontal, horizontal, report["epv"] / SIGMAS], dtype=float)
 
 
 def _velocity(report: dict[str, Any]) -> tuple[Array | None, Array | None]:

@@ -108,9 +108,16 @@ def imu_epoch(name: str, time: float, dtheta: Array, dvel: Array) -> ImuEpoch:
 
 def _geodetic(fields: list[str]) -> GnssEpoch:
     time, latitude, longitude, height, *rest = _numbers(fields, 7, 13)
-    if abs(latitude) > 90.0 or abs(longitude) > 360.0 or not HEIGHTS[0] < height < HEIGHTS[1]:
+    return _fix(time, geodetic_position(latitude, longitude, height), rest, True)
+
+
+def geodetic_position(latitude_deg: float, longitude_deg: float, height: float) -> Array:
+    """Return latitude, longitude (rad), height (m); raises RefusedError for what is nowhere near the ground."""
+    if not isfinite(latitude_deg + longitude_deg + height):
+        raise RefusedError("non-finite")
+    if abs(latitude_deg) > 90.0 or abs(longitude_deg) > 360.0 or not HEIGHTS[0] < height < HEIGHTS[1]:
         raise RefusedError("implausible")
-    return _fix(time, np.array([latitude * DEG, longitude * DEG, height]), rest, True)
+    return np.array([latitude_deg * DEG, longitude_deg * DEG, height])
 
 
 def _plane(fields: list[str]) -> GnssEpoch:

@@ -14,8 +14,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError
-from polyins.live.lines import LONGEST_INTERVAL, imu_epoch
-from polyins.rig import DEG
+from polyins.live.lines import LONGEST_INTERVAL, geodetic_position, imu_epoch
 
 MILLI_G = 9.80665e-3  # m/s^2
 RAW_KINDS = ("RAW_IMU", "SCALED_IMU", "HIGHRES_IMU")
@@ -102,7 +101,7 @@ def _raw_fix(message: Any) -> GnssEpoch:
         raise RefusedError("no fix in three dimensions")
     above_sea = message.alt_ellipsoid == 0  # it is an extension that old senders leave out
     height = 1e-3 * (message.alt if above_sea else message.alt_ellipsoid)
-    position = np.array([message.lat * 1e-7 * DEG, message.lon * 1e-7 * DEG, height])
+    position = geodetic_position(message.lat * 1e-7, message.lon * 1e-7, height)
     std = _std(1e-3 * message.h_acc, 1e-3 * message.v_acc)
     return GnssEpoch(message.time_usec * 1e-6, position, std, above_sea=above_sea)
 
@@ -110,7 +109,7 @@ def _raw_fix(message: Any) -> GnssEpoch:
 def _input_fix(message: Any) -> GnssEpoch:
     if message.fix_type < THREE_DIMENSIONS:
         raise RefusedError("no fix in three dimensions")
-    position = np.array([message.lat * 1e-7 * DEG, message.lon * 1e-7 * DEG, message.alt])
+    position = geodetic_position(message.lat * 1e-7, message.lon * 1e-7, message.alt)
     velocity = velocity_std = None
     if not message.ignore_flags & NO_VELOCITY and message.speed_accuracy > NO_ACCURACY:
         velocity = np.array([message.vn, message.ve, message.vd])

@@ -39,15 +39,17 @@ def open_source(url: str, imus: tuple[str, ...]) -> Source:
         raise InputError(f"--source {url}: unknown; expected one of {known}")
     try:
         return _OPENERS[parts.scheme](url, parts, imus)
-    except (OSError, ValueError) as error:
+    except InputError:
+        raise
+    except (OSError, OverflowError, ValueError) as error:
         raise InputError(f"--source {url}: cannot be opened ({error})") from error
 
 
 def address(url: str, parts: SplitResult, usual_port: int | None = None) -> tuple[str, int]:
     """Return host, the loopback address unless one is given, and port of a URL."""
-    port = parts.port or usual_port
+    port = usual_port if parts.port is None else parts.port
     if port is None:
-        raise InputError(f"{url}: has no port; expected {parts.scheme}://HOST:PORT")
+        raise InputError(f"--source {url}: has no port; expected {parts.scheme}://HOST:PORT")
     return parts.hostname or LOOPBACK, port
 
 
