@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
+SECONDS = click.FloatRange(0.0, 1e6)
+RATE = click.FloatRange(0.0, 1e4, min_open=True)
 
 as_json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document and nothing else.")
 no_report_option = click.option("--no-report", is_flag=True, help="Leave out report.html.")
@@ -191,11 +193,13 @@ def _compare(
 @click.option("--sink", "sinks", multiple=True, help="ndjson:, nmea+tcp://, nmea+udp://; each takes ?rate=HZ.")
 @click.option("--method", default=None, help="A method for arrays; unless given enav-fusion, single with one IMU.")
 @click.option("--speed", default="1", show_default=True, help="Of a replay: times real speed, or max.")
-@click.option("--rate", "rate_hz", default=10.0, show_default=True, help="States per second for sinks and log, Hz.")
-@click.option("--delay", default=0.5, show_default=True, help="How late an epoch may be, s.")
+@click.option("--rate", "rate_hz", type=RATE, default=10.0, show_default=True, help="Of sinks and log, Hz.")
+@click.option("--delay", type=SECONDS, default=0.5, show_default=True, help="How late an epoch may be, s.")
 @click.option("--page", default=None, type=int, help="Show a page in the browser at this port; 0: any free one.")
 @click.option("--bind", default="127.0.0.1", show_default=True, help="The address at which the page is served.")
-@click.option("--checkpoint-every", default=10.0, show_default=True, help="Seconds between checkpoints; 0: none.")
+@click.option(
+    "--checkpoint-every", type=SECONDS, default=10.0, show_default=True, help="Seconds between checkpoints; 0: none."
+)
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint in --out, if there is one.")
 @out_option("polyins-live")
 def live(config: Path, sources: tuple[str, ...], sinks: tuple[str, ...], speed: str, **options: Any) -> None:

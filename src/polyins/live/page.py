@@ -35,8 +35,8 @@ class Page:
         self.closed = False
         try:
             self.server = _Server((bind, port), self)
-        except OSError as error:
-            raise InputError(f"--page {port}: cannot be served at {bind} ({error.strerror or error})") from error
+        except (OSError, OverflowError) as error:
+            raise InputError(f"--page {port}: cannot be served at {bind} ({error})") from error
         self.url = f"http://{bind}:{self.server.server_address[1]}/"
         threading.Thread(target=self.server.serve_forever, name="page", daemon=True).start()
 

@@ -31,6 +31,7 @@ from polyins.live.session import Checkpoints, Session
 from polyins.live.sinks import Outlet, ParquetLog, open_sink
 from polyins.live.source import POLL, Source, open_source
 from polyins.live.starter import Starter
+from polyins.methods import find_method
 from polyins.recording import Recording
 from polyins.screen import announce_compilation, say
 
@@ -79,7 +80,7 @@ def run(options: Options) -> dict[str, Any]:
     """
     config, document, warnings = loading.read_config(options.config)
     recording, notes = _recording(options, config, document)
-    method = options.method or ("enav-fusion" if len(recording.rig.imus) > 1 else "single")
+    method = find_method(options.method or ("enav-fusion" if len(recording.rig.imus) > 1 else "single")).name
     results.make_folder(options.out)
     announce_compilation()
     session = _session(options, config, recording, method)

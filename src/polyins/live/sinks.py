@@ -172,6 +172,8 @@ class ParquetLog:
         values = columns([snapshot.state for snapshot in self.pending], first.origin, first.geodetic)
         rows = len(self.pending)
         arrays = {name: pa.nulls(rows, pa.float64()) if v is None else pa.array(v) for name, v in values.items()}
+        # the covariance of phi is not told live
+        arrays |= {f"std_phi_{axis}_deg": pa.nulls(rows, pa.float64()) for axis in ("north", "east", "down")}
         arrays["dead_reckoning"] = pa.array([snapshot.dead_reckoning for snapshot in self.pending])
         table = pa.table(arrays)
         if self.writer is None:
@@ -201,7 +203,9 @@ def open_sink(url: str, rate_hz: float, geodetic: bool, geoid_height: float | No
         if not 0.0 < rate <= 10e3:
             raise ValueError(f"rate is {rate:g}; expected above 0")
         return Outlet(_OPENERS[parts.scheme](url, parts, geoid_height), rate)
-    except (OSError, ValueError) as error:
+    except InputError:
+        raise
+    except (OSError, OverflowError, ValueError) as error:
         raise InputError(f"--sink {url}: {error}") from error
 
 

@@ -49,7 +49,7 @@ def address(url: str, parts: SplitResult, usual_port: int | None = None) -> tupl
     """Return host, the loopback address unless one is given, and port of a URL."""
     port = usual_port if parts.port is None else parts.port
     if port is None:
-        raise InputError(f"--source {url}: has no port; expected {parts.scheme}://HOST:PORT")
+        raise InputError(f"{url}: has no port; expected {parts.scheme}://HOST:PORT")
     return parts.hostname or LOOPBACK, port
 
 
