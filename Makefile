@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := $(VENV)/bin
 PICTURES := a3-sources a5-roughness afig7-gyro split-imus
 
-.PHONY: demo test lint types bench reproduce pictures clean
+.PHONY: demo test lint types bench live-flood reproduce pictures clean
 
 $(BIN)/polyins: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -37,6 +37,9 @@ pictures: $(BIN)/polyins
 
 bench: $(BIN)/polyins
 	$(BIN)/polyins bench
+
+live-flood: $(BIN)/polyins
+	$(BIN)/python benchmarks/live_flood.py
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache

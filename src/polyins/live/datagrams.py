@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import socket
-import struct
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -12,16 +10,13 @@ from collections.abc import Callable, Iterator
 from polyins.live import lines
 from polyins.live.events import Epoch, RefusedError
 from polyins.live.front import Front
+from polyins.live.receive import Receiver
 from polyins.live.source import POLL
 
 LONGEST = 8192
 """bytes of a datagram"""
 BUFFER = 4 * 1024 * 1024
 """bytes that the system is asked to keep while the program is busy"""
-AT_ONCE = 256
-"""datagrams in a chunk at most"""
-SO_RXQ_OVFL = 40
-"""Linux: tell with each datagram how many were lost because the buffer was full"""
 
 Parser = Callable[[bytes, Counter[str]], list[Epoch]]
 
@@ -47,16 +42,16 @@ class Datagrams:
         self.front = Front(self.counts)
         self.stopped = False
         self.socket = socket.socket(socket.AF_INET6 if ":" in address[0] else socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
-        if sys.platform == "linux":
-            self.socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
         self.socket.bind(address)
+        self.receiver = Receiver(self.socket, LONGEST, BUFFER, POLL)
 
     def chunks(self) -> Iterator[list[Epoch]]:
         """Yield what has come, as `Source` says."""
         with self.socket:
             while not self.stopped:
-                datagrams = self._received()
+                datagrams = self.receiver.receive()
+                if self.receiver.lost:
+                    self.counts["lost before they were read"] = self.receiver.lost
                 yield self.taken(datagrams, time.monotonic())
             yield self.front.release(time.monotonic())
 
@@ -75,22 +70,3 @@ class Datagrams:
             else:
                 epochs += self.parse(datagram, self.counts)
         return self.front.admit(epochs, now)
-
-    def _received(self) -> list[bytes]:
-        """Wait for a datagram and return it with those that are there already."""
-        datagrams: list[bytes] = []
-        self.socket.settimeout(POLL)
-        try:
-            while len(datagrams) < AT_ONCE:
-                datagram, extra, _, _ = self.socket.recvmsg(LONGEST + 1, 64)
-                datagrams.append(datagram)
-                self._count_lost(extra)
-                self.socket.settimeout(0.0)
-        except (TimeoutError, BlockingIOError):
-            pass
-        return datagrams
-
-    def _count_lost(self, extra: list[tuple[int, int, bytes]]) -> None:
-        for level, kind, value in extra:
-            if level == socket.SOL_SOCKET and kind == SO_RXQ_OVFL:
-                self.counts["lost before they were read"] = struct.unpack("I", value)[0]

@@ -26,6 +26,7 @@ from polyins.live.inbox import Inbox
 from polyins.live.intake import Intake
 from polyins.live.page import RATE_HZ as PAGE_RATE_HZ
 from polyins.live.page import Page
+from polyins.live.rehearsal import rehearse
 from polyins.live.replay import Replay
 from polyins.live.session import Checkpoints, Session
 from polyins.live.sinks import Outlet, ParquetLog, open_sink
@@ -106,6 +107,7 @@ class Live:
         self.page: Page | None = None
         self.files: list[Path] = []
         self.inbox = Inbox(len(sources))
+        self.failure: Exception | None = None
         self.told = (time.monotonic(), "")
 
     def open_outlets(self, options: Options, method: str, config: Config) -> None:
@@ -139,6 +141,8 @@ class Live:
             self.session.finish()
         finally:
             self._close()
+        if self.failure is not None:
+            raise self.failure
 
     def _take(self, epochs: list[Epoch]) -> None:
         for epoch in epochs:
@@ -158,6 +162,8 @@ class Live:
         try:
             for epochs in source.chunks():
                 self.inbox.put(_admitted(epochs, source, intake))
+        except Exception as error:
+            self.failure = error  # told when what has come is safe
         finally:
             self.inbox.source_ended()
 
@@ -230,6 +236,7 @@ def _session(options: Options, config: Config, recording: Recording, method: str
     needs_fix = recording.start.position is None and config.gnss is not None
     settings = {"method": method, "options": recording.options, "geodetic": recording.geodetic, "delay": delay}
     begin: Callable[[Start], Navigator] = partial(Navigator, rig, **settings)
+    rehearse(recording, delay, begin)
     starter = Starter(replace(recording, imus=(), gnss=None), delay, needs_fix)
     every = options.checkpoint_every or math.inf
     checkpoints = Checkpoints(options.out, every)
