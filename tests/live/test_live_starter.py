@@ -65,6 +65,17 @@ def test_a_start_given_fully_needs_no_motion(recording: Recording, epochs: list[
     assert len(rest) == len(epochs)
 
 
+def test_a_standstill_has_its_chance(recording: Recording, epochs: list[Epoch]) -> None:
+    _, start, _ = begun(replace(recording, start=StartOptions(heading=1.0)), epochs)
+    assert start is not None
+    assert start.sources["standstill"].startswith("found: 0.0")
+    assert 3.0 < start.time < 6.0
+    interval = (0.02, 7.5)
+    _, start, _ = begun(replace(recording, start=StartOptions(heading=1.0, static_interval=interval)), epochs)
+    assert start is not None
+    assert start.sources["gyro_bias"] == "mean of 7.5 s at standstill"
+
+
 def test_it_says_what_is_missing(recording: Recording, epochs: list[Epoch]) -> None:
     starter, start, _ = begun(recording, [e for e in epochs if isinstance(e, GnssEpoch) or e.imu != "imu3"])
     assert start is None
@@ -73,6 +84,9 @@ def test_it_says_what_is_missing(recording: Recording, epochs: list[Epoch]) -> N
     assert start is None
     assert "GNSS" in starter.why
     starter, start, _ = begun(recording, [e for e in epochs if e.time < 6.0])
+    assert start is None
+    assert starter.why == "collecting data until 9 s"
+    starter, start, _ = begun(replace(recording, start=StartOptions()), [e for e in epochs if e.time < 7.0])
     assert start is None
     assert "heading" in starter.why
 

@@ -16,6 +16,8 @@ from polyins.recording import GnssStream, ImuStream, Recording
 
 EVERY = 1.0
 """s of data between two attempts"""
+FIRST = 5.0
+"""s of data before the first attempt: a standstill of three seconds has its chance, unless nothing is to be found"""
 KEPT = 120.0
 """s of data that are kept: the longest standstill that is looked at, and as long again to move off"""
 CUT_EVERY = 10.0  # s
@@ -75,7 +77,8 @@ class Starter:
         self.newest = max(self.newest, epoch.time)
         rows.add(*_row(epoch))
         if self.attempt is None:
-            self.attempt = (epoch.time // EVERY + 1.0) * EVERY
+            self.attempt = self._first_attempt(epoch.time)
+            self.why = f"collecting data until {self.attempt:.0f} s"
         if epoch.time < self.attempt + self.delay:
             return None
         until, self.attempt = self.attempt, self.attempt + EVERY
@@ -86,6 +89,15 @@ class Starter:
             for rows in (*self.imus.values(), self.fixes):
                 rows.cut(until - KEPT)
         return None
+
+    def _first_attempt(self, begin: float) -> float:
+        start = self.blank.start
+        given = (start.position, start.velocity, start.roll_pitch, start.heading)
+        complete = not start.estimate_gyro_bias and all(value is not None for value in given)
+        earliest = begin if complete else begin + FIRST - EVERY
+        if start.static_interval is not None:
+            earliest = max(earliest, start.static_interval[1])
+        return (earliest // EVERY + 1.0) * EVERY
 
     def _found(self, until: float) -> Start | None:
         try:
