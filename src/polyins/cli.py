@@ -132,12 +132,9 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
 
 
 def _usual_method(recording: Recording, imu: str | None) -> str:
-    from polyins.modules import available
+    from polyins.modules import usual_method
 
-    if recording.rig.rolling:
-        order = ["wheel-ins", "dual-wheel-ins", "body-wheel-ins", "triple-ins"]
-        return next(name for name in reversed(order) if name in available(recording.rig))
-    return "enav-fusion" if len(recording.imus) > 1 and imu is None else "single"
+    return usual_method(recording.rig) if imu is None else "single"
 
 
 def _imu_index(names: list[str], wanted: str | None) -> int:
@@ -191,10 +188,11 @@ def _compare(
 @click.argument("config", type=FILE)
 @click.option("--source", "sources", multiple=True, help="replay:, -, udp://, tcp://, serial://, gpsd://, mavlink://")
 @click.option("--sink", "sinks", multiple=True, help="ndjson:, nmea+tcp://, nmea+udp://; each takes ?rate=HZ.")
-@click.option("--method", default=None, help="A method for arrays; unless given enav-fusion, single with one IMU.")
+@click.option("--method", default=None, help="A row of the method table, as for run.")
 @click.option("--speed", default="1", show_default=True, help="Of a replay: times real speed, or max.")
 @click.option("--rate", "rate_hz", type=RATE, default=10.0, show_default=True, help="Of sinks and log, Hz.")
-@click.option("--delay", type=SECONDS, default=0.5, show_default=True, help="How late an epoch may be, s.")
+@click.option("--delay", type=SECONDS, default=0.5, show_default=True, help="How late a fix may come, s.")
+@click.option("--wait", type=SECONDS, default=0.05, show_default=True, help="How long an epoch waits for an IMU, s.")
 @click.option("--page", default=None, type=int, help="Show a page in the browser at this port; 0: any free one.")
 @click.option("--bind", default="127.0.0.1", show_default=True, help="The address at which the page is served.")
 @click.option(

@@ -165,6 +165,15 @@ def _from_others(
     return np.asarray(found)
 
 
+def usual_method(rig: Rig) -> str:
+    """Return the method for a rig unless one is named: the richest up to `triple-ins` with wheels."""
+    if not rig.rolling:
+        return "enav-fusion" if len(rig.imus) > 1 else "single"
+    order = ("triple-ins", "body-wheel-ins", "dual-wheel-ins", "wheel-ins")
+    known = available(rig)
+    return next(name for name in order if name in known)
+
+
 def lanes(modules: Modules) -> tuple[list[tuple[int, int]], list[int]]:
     """Return the span of lanes of each share, and which IMU (counted among those that navigate) each lane takes.
 

@@ -1,6 +1,5 @@
 """A short drive of three IMUs, as a recording, as files and as datagrams."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
@@ -13,11 +12,6 @@ from polyins.live.replay import Replay
 from polyins.recording import Recording
 from polyins.simulation import files
 from polyins.simulation.scenario import Board, Scenario, simulate
-
-if importlib.util.find_spec("polyins.navigator") is None:
-    import fake_navigator
-
-    fake_navigator.install()
 
 
 @pytest.fixture(scope="session")

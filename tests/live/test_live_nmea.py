@@ -24,7 +24,7 @@ def snapshot(
         "attitude": quaternions(np.radians([[1.0, 2.0, 93.456]]))[0],
         "position_std": np.full(3, 0.1),
         "velocity_std": np.full(3, 0.1),
-        "attitude_std": np.full(3, 0.01),
+        "phi_covariance": np.zeros(6),
     }
     return Snapshot(SimpleNamespace(**values), values["position"], True, dead_reckoning)
 

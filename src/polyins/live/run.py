@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polyins import __version__, loading, results
+from polyins import __version__, loading, modules, results
 from polyins.alignment import Start
 from polyins.config import Config
 from polyins.errors import InputError
@@ -55,6 +55,7 @@ class Options:
     speed: float = 1.0
     rate_hz: float = 10.0
     delay: float = 0.5
+    wait: float = 0.05
     page: int | None = None
     bind: str = "127.0.0.1"
     checkpoint_every: float = 10.0
@@ -81,7 +82,7 @@ def run(options: Options) -> dict[str, Any]:
     """
     config, document, warnings = loading.read_config(options.config)
     recording, notes = _recording(options, config, document)
-    method = find_method(options.method or ("enav-fusion" if len(recording.rig.imus) > 1 else "single")).name
+    method = find_method(options.method or modules.usual_method(recording.rig)).name
     results.make_folder(options.out)
     announce_compilation()
     session = _session(options, config, recording, method)
@@ -233,11 +234,19 @@ def _session(options: Options, config: Config, recording: Recording, method: str
     from polyins.navigator import Navigator
 
     rig, delay = recording.rig, options.delay
+    latest = max(delay, options.wait)
     needs_fix = recording.start.position is None and config.gnss is not None
-    settings = {"method": method, "options": recording.options, "geodetic": recording.geodetic, "delay": delay}
-    begin: Callable[[Start], Navigator] = partial(Navigator, rig, **settings)
-    rehearse(recording, delay, begin)
-    starter = Starter(replace(recording, imus=(), gnss=None), delay, needs_fix)
+    begin: Callable[[Start], Navigator] = partial(
+        Navigator,
+        rig,
+        method=method,
+        options=recording.options,
+        geodetic=recording.geodetic,
+        delay=delay,
+        wait=options.wait,
+    )
+    rehearse(recording, latest, begin)
+    starter = Starter(replace(recording, imus=(), gnss=None), latest, needs_fix)
     every = options.checkpoint_every or math.inf
     checkpoints = Checkpoints(options.out, every)
     session = Session(starter, begin, (), checkpoints)

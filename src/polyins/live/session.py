@@ -18,7 +18,7 @@ from polyins.live.snapshot import Snapshot
 from polyins.live.starter import Starter
 
 if TYPE_CHECKING:
-    from polyins.navigator import Navigator, NavigatorState
+    from polyins.navigator import ImuHealth, Navigator, NavigatorState
 
 SILENT_GNSS = 2.0
 """s without a fix that are dead reckoning; at least, and 2.5 times the usual interval"""
@@ -84,7 +84,9 @@ class Session:
             self.navigator = self.begin(self.start)
             self.fix_times.append(self.start.time)  # what the start knows, a fix would have said
             for one in collected:
-                self._feed(one)
+                # earlier fixes are in the start
+                if isinstance(one, ImuEpoch) or one.time > self.start.time:
+                    self._feed(one)
 
     def finish(self) -> None:
         """Let the navigator take what still waits, and pass the last state on."""
@@ -167,16 +169,12 @@ def _keep_origin(path: Path, origin: Array) -> None:
     write_bytes(path, content.getvalue())
 
 
-def _health(one: Any) -> dict[str, Any]:
+def _health(one: ImuHealth) -> dict[str, Any]:
     return {
         "name": one.name,
-        "rate_hz": _number(one.rate_hz),
-        "gyro_residual_deg_s": _number(np.degrees(np.linalg.norm(one.gyro_residual))),
-        "accel_residual_m_s2": _number(np.linalg.norm(one.accel_residual)),
-        "last_time_s": _number(one.last_time),
-        "silent": bool(one.silent),
+        "rate_hz": one.rate_hz,
+        "gyro_residual_deg_s": None if one.gyro_residual is None else float(np.degrees(one.gyro_residual)),
+        "accel_residual_m_s2": one.accel_residual,
+        "last_time_s": one.last_time,
+        "silent": one.silent,
     }
-
-
-def _number(value: Any) -> float | None:
-    return None if value is None or not np.isfinite(value) else float(value)

@@ -172,8 +172,6 @@ class ParquetLog:
         values = columns([snapshot.state for snapshot in self.pending], first.origin, first.geodetic)
         rows = len(self.pending)
         arrays = {name: pa.nulls(rows, pa.float64()) if v is None else pa.array(v) for name, v in values.items()}
-        # the covariance of phi is not told live
-        arrays |= {f"std_phi_{axis}_deg": pa.nulls(rows, pa.float64()) for axis in ("north", "east", "down")}
         arrays["dead_reckoning"] = pa.array([snapshot.dead_reckoning for snapshot in self.pending])
         table = pa.table(arrays)
         if self.writer is None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluation.attitude import euler_angles
+from polyins.evaluation.attitude import euler_angles, euler_variance
 from polyins.geodesy import displacement
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 _LOCAL = ("north_m", "east_m", "down_m")
 _VELOCITY = ("north_velocity_m_s", "east_velocity_m_s", "down_velocity_m_s")
 _EULER = ("roll_deg", "pitch_deg", "heading_deg")
+_PHI = tuple(f"std_phi_{axis}_deg" for axis in ("north", "east", "down"))
 
 
 @dataclass(frozen=True)
@@ -45,12 +46,13 @@ class Snapshot:
 
 
 def columns(states: Sequence[NavigatorState], origin: Array, geodetic: bool) -> dict[str, Array | None]:
-    """Return states as the columns of `solution.parquet`, less the std of phi; None: not known on a local plane."""
+    """Return states as the columns of `solution.parquet`; None: not known on a local plane."""
 
     def stacked(name: str) -> Array:
         return np.array([getattr(state, name) for state in states])
 
-    position, degrees = stacked("position"), np.degrees(euler_angles(stacked("attitude")))
+    position, phi, euler = stacked("position"), stacked("phi_covariance"), euler_angles(stacked("attitude"))
+    degrees = np.degrees(euler)
     degrees[:, 2] %= 360.0
     latitude, longitude = np.degrees(position[:, :2]).T if geodetic else (None, None)
     return {
@@ -62,7 +64,8 @@ def columns(states: Sequence[NavigatorState], origin: Array, geodetic: bool) -> 
         **_named(_EULER, degrees),
         **_named([f"std_{name}" for name in _LOCAL], stacked("position_std")),
         **_named([f"std_{name}" for name in _VELOCITY], stacked("velocity_std")),
-        **_named([f"std_{name}" for name in _EULER], np.degrees(stacked("attitude_std"))),
+        **_named([f"std_{name}" for name in _EULER], np.degrees(np.sqrt(euler_variance(euler, phi)))),
+        **_named(_PHI, np.degrees(np.sqrt(phi[:, [0, 3, 5]]))),
         **_named(_LOCAL, displacement(position, origin, geodetic)),
     }
 
