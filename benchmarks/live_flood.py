@@ -89,7 +89,7 @@ def received(
         address = free.getsockname()
     command = [sys.executable, "-m", "polyins", "live", str(config), "--out", str(out), "--sink", "nmea+udp://:9"]
     process = subprocess.Popen([*command, "--source", f"udp://127.0.0.1:{address[1]}"])
-    time.sleep(5.0)
+    wait_until_bound(address[1])
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     sent, memory, late = send(address, stream, junk_hz, process.pid)
     time.sleep(1.0)
@@ -108,6 +108,15 @@ def received(
         "cpu_s": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
     }
     return {row["time_s"]: row for row in rows}, figures
+
+
+def wait_until_bound(port: int) -> None:
+    """Wait until somebody listens at a UDP port (Linux)."""
+    until = time.monotonic() + 120.0
+    while f":{port:04X} " not in Path("/proc/net/udp").read_text():
+        if time.monotonic() > until:
+            raise TimeoutError(f"nobody listens at {port}")
+        time.sleep(0.1)
 
 
 def send(

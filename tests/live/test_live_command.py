@@ -14,10 +14,11 @@ import pytest
 from click.testing import CliRunner
 from pyarrow import parquet
 
-from polyins import cli
+from polyins import batch, cli
 from polyins.errors import InputError
 from polyins.io.solution_files import read_solution
 from polyins.live.run import Options, run
+from polyins.recording import Recording
 
 FAR = 30.0  # s
 PROGRAM = "import conftest, polyins.cli; polyins.cli.main()"
@@ -63,6 +64,15 @@ def test_the_log_holds_what_was_printed(replayed: tuple[list[dict[str, float]], 
     solution = read_solution(out)
     np.testing.assert_allclose(solution.time, [row["time_s"] for row in rows])
     assert {path.name for path in out.iterdir()} >= {"summary.json", "solution.parquet", "checkpoint.npz"}
+
+
+def test_the_log_of_every_epoch_is_that_of_a_batch_run(recording: Recording, drive: Path, tmp_path: Path) -> None:
+    run(Options(drive, tmp_path, sinks=(), speed=float("inf"), rate_hz=50.0))
+    live, whole = read_solution(tmp_path), batch.run(recording, "enav-fusion")
+    np.testing.assert_array_equal(live.time, whole.time)
+    np.testing.assert_array_equal(live.velocity, whole.velocity)
+    np.testing.assert_allclose(live.position, whole.position, rtol=1e-15, atol=0.0)  # they were degrees
+    np.testing.assert_allclose(live.phi_covariance[:, [0, 3, 5]], whole.phi_covariance[:, [0, 3, 5]], rtol=1e-12)
 
 
 def test_standard_input_gives_what_the_replay_gives(

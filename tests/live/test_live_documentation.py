@@ -92,7 +92,7 @@ def test_the_script_is_heard(desk: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert said["start"]["standstill"].startswith("found")
     assert said["start"]["heading"] == "given"
     assert said["epochs"]["left"] == said["epochs"]["right"] > 700
-    assert said["fixes"] >= 7
+    assert said["fixes"] >= 3  # those before the start are in it
     assert said["status"] == "navigating"
 
 
