@@ -15,7 +15,7 @@ from polyins.live.source import POLL
 
 LONGEST = 8192
 """bytes of a datagram"""
-BUFFER = 4 * 1024 * 1024
+BUFFER = 16 * 1024 * 1024
 """bytes that the system is asked to keep while the program is busy"""
 
 Parser = Callable[[bytes, Counter[str]], list[Epoch]]
