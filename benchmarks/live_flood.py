@@ -3,9 +3,9 @@
     python benchmarks/live_flood.py [SECONDS]
 
 Sends a simulated drive over UDP to `polyins live`, first alone, then among malformed, duplicated, reordered,
-future-stamped and oversized datagrams, and prints one JSON document: what was refused, how much memory was taken after
-two fifths of the time and at the end, the share of one core, and whether the states are the same to the bit. Exit code 0:
-they are, nothing was lost and memory did not grow.
+future-stamped and oversized datagrams, and prints one JSON document: what was refused, how much memory was taken
+after two fifths of the time and at the end, CPU time, and whether the states are the same to the bit. Exit code 0: they
+are, and memory did not grow.
 """
 
 from __future__ import annotations

@@ -74,6 +74,8 @@ class Session:
     def resume(self, navigator: Navigator, origin: Array) -> None:
         """Go on with a navigator from a checkpoint instead of looking for a start."""
         self.navigator, self.origin = navigator, origin
+        if navigator.state is not None:
+            self.fix_times.append(navigator.state.time)  # what it knows, a fix would have said
 
     def take(self, epoch: Epoch) -> None:
         """Take the next epoch."""

@@ -8,7 +8,7 @@ import socket
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from math import floor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -130,6 +130,8 @@ class NmeaServer:
 
     def close(self) -> None:
         """Disconnect all."""
+        with suppress(OSError):
+            self.server.shutdown(socket.SHUT_RDWR)  # wakes the thread that accepts
         for one in (self.server, *self.clients):
             one.close()
 
