@@ -6,7 +6,7 @@ import threading
 
 from polyins.live.events import Epoch
 
-FULL = 50_000
+FULL = 200_000
 """epochs; a source that brings more waits, and what a socket cannot hold then is lost and counted there"""
 
 

@@ -198,6 +198,7 @@ class Live:
             "sources": [source.url for source, _ in self.sources],
             "stopped_by": self.stopped_by or "end of data",
             "status": report["status"],
+            "geodetic": session.starter.blank.geodetic,
             "start": session.start and {"time_s": session.start.time, **session.start.sources},
             "end_s": session.last.state.time if session.last else None,
             "epochs": {name: session.epochs[name] for name in names},

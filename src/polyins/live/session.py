@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 SILENT_GNSS = 2.0
 """s without a fix that are dead reckoning; at least, and 2.5 times the usual interval"""
+BEFORE_START = 2.0
+"""s of data before the start, by which the navigator knows the rates of the IMUs"""
 LONGEST_LAG = 1.0
 """s by which a state is taken to follow the stamp of what has come"""
 
@@ -87,7 +89,7 @@ class Session:
             self.fix_times.append(self.start.time)  # what the start knows, a fix would have said
             for one in collected:
                 # earlier fixes are in the start
-                if isinstance(one, ImuEpoch) or one.time > self.start.time:
+                if one.time > self.start.time - (BEFORE_START if isinstance(one, ImuEpoch) else 0.0):
                     self._feed(one)
 
     def finish(self) -> None:
