@@ -91,12 +91,14 @@ def received(
         address = free.getsockname()
     command = [sys.executable, "-m", "polyins", "live", str(config), "--out", str(out), "--sink", "nmea+udp://:9"]
     process = subprocess.Popen([*command, "--source", f"udp://127.0.0.1:{address[1]}"])
-    wait_until_bound(address[1])
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    sent, memory, late = send(address, stream, junk_hz, process.pid)
-    time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
-    code = process.wait(60.0)
+    try:
+        wait_until_bound(address[1])
+        sent, memory, late = send(address, stream, junk_hz, process.pid)
+        time.sleep(1.0)
+    finally:
+        process.send_signal(signal.SIGINT)
+        code = process.wait(60.0)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     summary = json.loads((out / "summary.json").read_text())
     rows = parquet.read_table(out / "solution.parquet").to_pylist()
