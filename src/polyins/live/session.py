@@ -67,7 +67,7 @@ class Session:
         self.start: Start | None = None
         self.origin: Array | None = None
         self.epochs: Counter[str] = Counter()
-        """what was fed to the navigator, by IMU, and fixes as GNSS"""
+        """what the navigator took, by IMU, and fixes as GNSS"""
         self.fix_times: deque[float] = deque(maxlen=6)
         self.due = float("-inf")
         """s: a state is looked at when a stamp has come that far"""
@@ -105,14 +105,22 @@ class Session:
 
     def _feed(self, epoch: Epoch) -> None:
         assert self.navigator is not None
+        refused = sum(self.navigator.counts.values())
         if isinstance(epoch, ImuEpoch):
-            self.epochs[epoch.imu] += 1
             self.navigator.imu(epoch.time, epoch.dtheta, epoch.dvel, self.index[epoch.imu])
         else:
             assert epoch.position_std is not None
+            self.navigator.gnss(epoch.time, epoch.position, epoch.position_std, epoch.velocity, epoch.velocity_std)
+        # when a state is told depends on what was taken, never on what was refused
+        if sum(self.navigator.counts.values()) == refused:
+            self._taken(epoch)
+
+    def _taken(self, epoch: Epoch) -> None:
+        if isinstance(epoch, ImuEpoch):
+            self.epochs[epoch.imu] += 1
+        else:
             self.epochs["GNSS"] += 1
             self.fix_times.append(epoch.time)
-            self.navigator.gnss(epoch.time, epoch.position, epoch.position_std, epoch.velocity, epoch.velocity_std)
         if epoch.time >= self.due:
             self._look(epoch.time)
 
