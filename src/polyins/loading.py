@@ -124,6 +124,51 @@ def assemble(
     )
 
 
+def without_data(config: Config, document: Document) -> tuple[Recording, tuple[str, ...]]:
+    """Return a recording that has no streams yet: the rig, how to start, what the filter is told; and warnings.
+
+    Positions are geodetic unless there is no GNSS or it is turned into metres, or the start's are on a local plane.
+    Raises InputError for settings that need data beforehand.
+    """
+    notes = wheel_checks.check_settings(config, document)
+    for index, entry in enumerate(config.imus):
+        if entry.time_offset:
+            place = document.place(["imus", index, "time_offset"])
+            raise InputError(f"{place}: is found from a whole recording; expected clock_offset_s")
+    if config.start.heading_from == "reference":
+        place = document.place(["start", "heading_from"])
+        raise InputError(f"{place}: is reference, which live data have not; expected heading_deg or gnss-course")
+    imus = []
+    for index, entry in enumerate(config.imus):
+        with document.at(["imus", index]):
+            imus.append(as_mounted(entry))
+    start, texts = start_options(config.start, document, clocks.ALWAYS)
+    geodetic = config.gnss is not None and config.gnss.plane_origin is None
+    if config.start.position:
+        geodetic = config.start.position.geodetic
+    rig, options = _rig(config, document, tuple(imus)), _filter_options(config)
+    recording = Recording(rig, (), geodetic=geodetic, start=start, options=options, name=config.name)
+    return recording, (*notes, *texts, *_not_live(config))
+
+
+def _not_live(config: Config) -> list[str]:
+    """Say what is configured and not looked at in live data."""
+    keys = {
+        "outages": bool(config.outages),
+        "reference": config.reference is not None,
+        "gnss.rate_hz": config.gnss is not None and config.gnss.rate_hz is not None,
+        "imus[].rate_hz": any(imu.rate_hz is not None for imu in config.imus),
+        "imus[].gyro_range_deg_s": any(imu.gyro_range_deg_s is not None for imu in config.imus),
+        "start.end_time_s": config.start.end_time_s is not None,
+    }
+    return [f"{key}: is not looked at in live data" for key, given in keys.items() if given]
+
+
+def _rig(config: Config, document: Document, imus: tuple[Imu, ...]) -> Rig:
+    with document.at(["gnss", "antenna_position_m"]):
+        return Rig(imus, np.array(config.gnss.antenna_position_m) if config.gnss else np.zeros(3))
+
+
 def in_force(config: Config, offsets: tuple[Offset, ...] = ()) -> str:
     """Return the configuration as YAML, with the clock offsets that were found in the place of those to be found."""
     found = {offset.name: offset.offset_s for offset in offsets}

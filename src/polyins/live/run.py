@@ -34,7 +34,7 @@ from polyins.live.source import POLL, Source, open_source
 from polyins.live.starter import Starter
 from polyins.methods import find_method
 from polyins.recording import Recording
-from polyins.screen import announce_compilation, say
+from polyins.screen import compilation_said, say
 
 if TYPE_CHECKING:
     from polyins.navigator import Navigator
@@ -84,7 +84,6 @@ def run(options: Options) -> dict[str, Any]:
     recording, notes = _recording(options, config, document)
     method = find_method(options.method or modules.usual_method(recording.rig)).name
     results.make_folder(options.out)
-    announce_compilation()
     session = _session(options, config, recording, method)
     with _stop_signals() as stopped:
         live = Live(session, _sources(options, config, recording, session), stopped)
@@ -246,7 +245,8 @@ def _session(options: Options, config: Config, recording: Recording, method: str
         delay=delay,
         wait=options.wait,
     )
-    rehearse(recording, latest, begin)
+    with compilation_said():
+        rehearse(recording, latest, begin)
     starter = Starter(replace(recording, imus=(), gnss=None), latest, needs_fix)
     every = options.checkpoint_every or math.inf
     checkpoints = Checkpoints(options.out, every)
