@@ -11,7 +11,7 @@ from array_recordings import START, Array, shaken_path, shaken_recording, start_
 from driven_vehicle import drive, without
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from playing import events, feed, navigator_for, play, row, rows
+from playing import Event, events, feed, navigator_for, play, row, rows
 
 from polyins import batch
 from polyins.errors import InputError
@@ -147,16 +147,20 @@ def test_killed_anywhere_it_resumes_bit_for_bit(method: str, tmp_path: Path) -> 
     prepared = batch.prepare(recording, method)
     recording, played = prepared.recording, events(prepared.recording, 0.21)
     whole = navigator_for(prepared)
-    play(whole, recording, played)
-    for place in np.random.default_rng(5).integers(0, len(played), 12):
+    hand_over(whole, recording, played)
+    for place in np.random.default_rng(5).integers(0, len(played), 5):
         navigator = navigator_for(prepared)
-        for event in played[:place]:
-            feed(navigator, recording, event)
+        hand_over(navigator, recording, played[:place])
         navigator.save(tmp_path / "checkpoint")
         resumed = Navigator.resume(tmp_path / "checkpoint")
-        play(resumed, recording, played[place:])
+        hand_over(resumed, recording, played[place:])
         np.testing.assert_array_equal(window(resumed), window(whole))
         assert resumed.counts == whole.counts
+
+
+def hand_over(navigator: Navigator, recording: Recording, played: list[Event]) -> None:
+    for event in played:
+        feed(navigator, recording, event)
 
 
 def test_another_file_is_no_checkpoint(tmp_path: Path) -> None:
