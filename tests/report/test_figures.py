@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plotted import plotted
 from synthetic_solutions import RADIUS_M, drive, no_innovations
 
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
@@ -35,7 +36,7 @@ def named(figure, name: str) -> list:
 
 
 def test_the_track_is_drawn_in_metres_with_equal_scales(scene):
-    figure = trajectory_figure(scene)
+    figure = plotted(trajectory_figure(scene))
     (reference,) = named(figure, "reference")
     assert np.ptp(reference.x) == pytest.approx(2.0 * RADIUS_M, rel=1e-3)
     assert np.ptp(reference.y) == pytest.approx(2.0 * RADIUS_M, rel=1e-3)
@@ -44,7 +45,7 @@ def test_the_track_is_drawn_in_metres_with_equal_scales(scene):
 
 
 def test_rejected_fixes_are_drawn_once_where_they_were_measured(scene):
-    (rejected,) = named(trajectory_figure(scene), "rejected fixes")
+    (rejected,) = named(plotted(trajectory_figure(scene)), "rejected fixes")
     truth = drive(duration=300.0)
     times = scene.runs[0].solution.innovations.time[[5, 40]]
     where = truth.local[np.searchsorted(truth.time, times)]
@@ -53,13 +54,13 @@ def test_rejected_fixes_are_drawn_once_where_they_were_measured(scene):
 
 
 def test_only_the_track_inside_outages_is_marked(scene):
-    (marked,) = named(trajectory_figure(scene), "GNSS outage")
+    (marked,) = named(plotted(trajectory_figure(scene)), "GNSS outage")
     assert np.isnan(marked.x).any()
     assert not np.isnan(marked.x).all()
 
 
 def test_error_curves_reach_the_peaks_of_the_errors(scene):
-    figure = position_figure(scene)
+    figure = plotted(position_figure(scene))
     for run in scene.runs:
         lines = named(figure, run.name)
         assert len(lines) == 3
@@ -69,7 +70,11 @@ def test_error_curves_reach_the_peaks_of_the_errors(scene):
 
 
 def test_bands_are_three_standard_deviations(scene):
-    bands = [trace for trace in position_figure(scene).data if trace.legendgroup == "nav-fusion" and trace.name is None]
+    bands = [
+        trace
+        for trace in plotted(position_figure(scene)).data
+        if trace.legendgroup == "nav-fusion" and trace.name is None
+    ]
     assert len(bands) == 6
     widest = 3.0 * np.sqrt(scene.runs[2].solution.position_variance.max())
     assert max(np.max(band.y) for band in bands) == pytest.approx(widest, rel=1e-6)
@@ -77,25 +82,25 @@ def test_bands_are_three_standard_deviations(scene):
 
 
 def test_attitude_errors_are_in_degrees(scene):
-    line = named(attitude_figure(scene), "single")[2]
+    line = named(plotted(attitude_figure(scene)), "single")[2]
     assert np.max(np.abs(line.y)) == pytest.approx(np.degrees(0.002), rel=1e-3)
 
 
 def test_time_runs_from_the_start_and_outages_are_shaded(scene):
-    figure = position_figure(scene)
+    figure = plotted(position_figure(scene))
     assert [(shape.x0, shape.x1) for shape in figure.layout.shapes] == [(30.0, 60.0), (120.0, 150.0), (210.0, 240.0)]
     assert figure.layout.xaxis.range == (0.0, 300.0)
 
 
 def test_bars_are_the_outages_maxima(scene, compared):
-    figure = outage_figure(scene)
+    figure = plotted(outage_figure(scene))
     for bar, run in zip(figure.data, scene.runs, strict=True):
         assert list(bar.y) == compared["methods"][run.name]["outages"]["each_m"]
         assert f"rms {run.summary['outages']['horizontal_max_rms_m']:.2f} m" in bar.name
 
 
 def test_imu_errors_are_drawn_for_each_imu_in_datasheet_units(scene):
-    figure = imu_error_figure(scene)
+    figure = plotted(imu_error_figure(scene))
     shown = [trace for trace in figure.data if trace.visible]
     assert len(shown) == 6 * 12
     assert [trace.name for trace in shown[:6]] == [f"imu{k}" for k in range(1, 7)]
@@ -106,7 +111,7 @@ def test_imu_errors_are_drawn_for_each_imu_in_datasheet_units(scene):
 
 
 def test_each_choice_of_the_menu_shows_one_run(scene):
-    figure = innovation_figure(scene)
+    figure = plotted(innovation_figure(scene))
     (menu,) = figure.layout.updatemenus
     masks = np.array([button.args[0]["visible"] for button in menu.buttons])
     assert masks.shape == (4, len(figure.data))
@@ -114,14 +119,14 @@ def test_each_choice_of_the_menu_shows_one_run(scene):
 
 
 def test_rejected_residuals_stay_in_sight_and_tell_their_value(scene):
-    figure = innovation_figure(scene)
+    figure = plotted(innovation_figure(scene))
     rejected = named(figure, "rejected")[0]
     assert np.all(np.abs(rejected.y) <= figure.layout.yaxis.range[1])
     assert np.all(rejected.customdata > 2.5)
 
 
 def test_three_sigma_are_drawn_at_the_fixes_and_not_between(scene):
-    bars = [trace for trace in innovation_figure(scene).data if trace.name == "3 sigma"]
+    bars = [trace for trace in plotted(innovation_figure(scene)).data if trace.name == "3 sigma"]
     innovations = scene.runs[0].solution.innovations
     np.testing.assert_allclose(bars[0].error_y.array, 3.0 * innovations.std[:, 0], rtol=1e-6)
     np.testing.assert_allclose(bars[0].x, innovations.time - 1000.0, atol=1e-3)
@@ -136,7 +141,7 @@ def test_the_fix_after_an_outage_does_not_flatten_the_others(made_runs, made_rec
     scene = Scene.of(
         {"single": (replace(made, innovations=replace(shown, residual=residual)), summary)}, made_recording, None
     )
-    figure = innovation_figure(scene)
+    figure = plotted(innovation_figure(scene))
     assert figure.layout.yaxis.range[1] < 1.0
     drawn = named(figure, "residual")[0]
     assert np.min(drawn.y) >= figure.layout.yaxis.range[0]
@@ -147,16 +152,16 @@ def test_a_run_that_rejected_every_fix_is_drawn(made_runs, made_recording):
     made, summary = made_runs["single"]
     none = replace(made.innovations, accepted=np.zeros_like(made.innovations.accepted))
     scene = Scene.of({"single": (replace(made, innovations=none), summary)}, made_recording, None)
-    assert len(named(innovation_figure(scene), "rejected")) == 3
+    assert len(named(plotted(innovation_figure(scene)), "rejected")) == 3
 
 
 def test_without_reference_fixes_or_outages_the_rest_is_drawn(blind):
-    assert [trace.name for trace in trajectory_figure(blind).data] == ["enav-fusion"]
+    assert [trace.name for trace in plotted(trajectory_figure(blind)).data] == ["enav-fusion"]
     assert outage_figure(blind) is None
     assert velocity_figure(blind) is None
     assert imu_error_figure(blind) is None
     assert innovation_figure(blind) is None
-    lines = named(position_figure(blind), "enav-fusion")
+    lines = named(plotted(position_figure(blind)), "enav-fusion")
     assert all(np.isnan(line.y).all() for line in lines)
 
 
@@ -166,10 +171,10 @@ def test_a_solution_that_diverged_is_drawn_as_far_as_it_goes(made_runs, made_rec
     position[3000:] = np.nan
     broken = replace(made, position=position, position_variance=np.where(np.isnan(position), np.inf, 1.0))
     scene = Scene.of({"enav-fusion": (broken, summary)}, made_recording, None)
-    line = named(position_figure(scene), "enav-fusion")[0]
+    line = named(plotted(position_figure(scene)), "enav-fusion")[0]
     last = np.max(line.x[~np.isnan(line.y)])
     assert last == pytest.approx(made.time[2999] - made.time[0])
-    (track,) = named(trajectory_figure(scene), "enav-fusion")
+    (track,) = named(plotted(trajectory_figure(scene)), "enav-fusion")
     assert np.isfinite(track.x).sum() > 500
 
 
@@ -177,8 +182,8 @@ def test_names_are_drawn_as_they_are_written(made_runs, made_recording):
     made, summary = made_runs["nav-fusion"]
     odd = replace(made, imu_names=("<b>bold</b>", *made.imu_names[1:]))
     scene = Scene.of({"a<i>b": (odd, summary)}, made_recording, None)
-    assert named(position_figure(scene), "a&lt;i&gt;b")
-    assert named(imu_error_figure(scene), "&lt;b&gt;bold&lt;/b&gt;")
+    assert named(plotted(position_figure(scene)), "a&lt;i&gt;b")
+    assert named(plotted(imu_error_figure(scene)), "&lt;b&gt;bold&lt;/b&gt;")
 
 
 def test_each_method_has_a_colour_of_its_own_and_repeated_ones_a_dash():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plotted import plotted
 from synthetic_solutions import drifting, drive, no_innovations, recording, reference
 
 from polyins.evaluation.attitude import rotation_matrices
@@ -58,7 +59,7 @@ def test_methods_with_wheels_are_known_by_their_name():
 
 
 def test_the_dots_of_the_drift_figure_are_what_the_rate_is_the_mean_of(scene):
-    figure = drift_figure(scene)
+    figure = plotted(drift_figure(scene))
     assert len(figure.data) == 2 * len(scene.runs)
     for run, curve, dots in zip(scene.runs, figure.data[::2], figure.data[1::2], strict=True):
         rate = run.summary["drift"]["rate_percent"]
@@ -76,29 +77,29 @@ def test_without_wheels_or_reference_there_is_no_drift_figure(scene, made_runs, 
 
 
 def test_only_known_attitude_errors_have_a_row(scene):
-    figure = attitude_figure(scene)
+    figure = plotted(attitude_figure(scene))
     titles = [axis.title.text for axis in figure.select_yaxes()]
     assert titles == ["heading (deg)"]
     assert {trace.name for trace in figure.data if trace.name} == set(METHODS)
-    assert len(list(position_figure(scene).select_yaxes())) == 3
+    assert len(list(plotted(position_figure(scene)).select_yaxes())) == 3
 
 
 def test_tracks_are_drawn_at_the_point_that_the_reference_follows(scene):
     run = scene.runs[0]
     at_own_point = displacement(run.solution.position, scene.origin, True)
     moved = at_own_point + rotation_matrices(run.solution.attitude) @ ANTENNA
-    (track,) = [trace for trace in trajectory_figure(scene).data if trace.name == run.name]
+    (track,) = [trace for trace in plotted(trajectory_figure(scene)).data if trace.name == run.name]
     np.testing.assert_allclose([track.y[0], track.x[0]], moved[0, :2], atol=1e-3)
     np.testing.assert_allclose([track.y[-1], track.x[-1]], moved[-1, :2], atol=1e-3)
 
 
 def test_gaps_in_the_data_of_an_imu_that_navigates_are_shaded(scene):
-    (shape,) = position_figure(scene).layout.shapes
+    (shape,) = plotted(position_figure(scene)).layout.shapes
     assert (shape.x0, shape.x1) == (pytest.approx(40.0, abs=0.06), pytest.approx(42.0, abs=0.06))
     assert shape.fillcolor == SILENCE
-    assert len(imu_error_figure(scene).layout.shapes) == 3
+    assert len(plotted(imu_error_figure(scene)).layout.shapes) == 3
     alone = replace(scene, runs=scene.runs[:1])
-    assert position_figure(alone).layout.shapes == ()
+    assert plotted(position_figure(alone)).layout.shapes == ()
 
 
 def test_the_table_shows_drift_with_wheels_only(scene, made_runs, made_recording):
@@ -128,4 +129,4 @@ def test_a_curve_is_labelled_with_its_own_rate_where_the_summary_is_over_several
     compared = comparison({"triple-ins": triple}, [single, other], "wheel-ins")
     scene = Scene.of({"wheel-ins": runs["wheel-ins"]}, driven, compared)
     assert scene.runs[0].summary["drift"]["rate_percent"] > 4.5
-    assert drift_figure(scene).data[0].name == f"wheel-ins (mean {single['drift']['rate_percent']:.2f} %)"
+    assert plotted(drift_figure(scene)).data[0].name == f"wheel-ins (mean {single['drift']['rate_percent']:.2f} %)"

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polyins.evaluation.drift import drift_curve, drift_rates
 from polyins.report.decimation import kept_for_display, points_per_trace
+from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.scene import Run, Scene
 from polyins.report.style import finish
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 DRAWN_FROM = 0.05
 """share of the way: before it, any error is a large part of the distance"""
@@ -21,27 +18,25 @@ DRAWN_FROM = 0.05
 
 def drift_figure(scene: Scene) -> Figure | None:
     """Draw the curves, percent over m, with marks where the rate is taken; None without wheels or reference."""
-    from plotly.graph_objects import Figure
-
     runs = [run for run in scene.runs if run.on_wheels and run.errors is not None and run.errors.time.size]
     if not runs:
         return None
     figure = Figure([trace for run in runs for trace in _traces(run, points_per_trace(len(runs)))])
     finish(figure, height=440)
-    figure.update_xaxes(title_text="distance travelled (m)", rangemode="tozero")
-    figure.update_yaxes(title_text="drift rate (%)", rangemode="tozero")
+    figure.update_layout(
+        xaxis={"title": {"text": "distance travelled (m)"}, "rangemode": "tozero"},
+        yaxis={"title": {"text": "drift rate (%)"}, "rangemode": "tozero"},
+    )
     return figure
 
 
-def _traces(run: Run, points: int) -> Iterator[Any]:
-    from plotly.graph_objects import Scatter
-
+def _traces(run: Run, points: int) -> Iterator[Trace]:
     assert run.errors is not None
     distance, rate = run.errors.distance, drift_curve(run.errors)
     known = np.flatnonzero((distance > DRAWN_FROM * distance[-1]) & np.isfinite(rate))
     drawn = known[kept_for_display(rate[known, None], points)]
     multiples, rates = drift_rates(run.errors, run.summary["drift"]["step_m"])
-    yield Scatter(
+    yield scatter(
         x=distance[drawn].astype(np.float32),
         y=rate[drawn].astype(np.float32),
         # the summary of a method may be over several runs; this is one
@@ -51,7 +46,7 @@ def _traces(run: Run, points: int) -> Iterator[Any]:
         line={"color": run.colour, "dash": run.dash, "width": 1.8},
         hovertemplate="%{y:.3f} % after %{x:.0f} m",
     )
-    yield Scatter(
+    yield scatter(
         x=multiples,
         y=rates,
         name=run.label,

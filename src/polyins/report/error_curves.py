@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.evaluation.attitude import euler_angles, euler_variance
 from polyins.report.decimation import kept_for_display, points_per_trace
+from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.palette import transparent
 from polyins.report.scene import Run, Scene
 from polyins.report.style import finish, mark_time, stacked
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 Array = NDArray[np.float64]
 
@@ -69,10 +66,10 @@ def _figure(scene: Scene, curves: Sequence[Curves], titles: Sequence[str]) -> Fi
     figure = stacked([titles[axis] for axis in axes])
     points = points_per_trace(3 * len(axes) * len(curves))
     opacity = 0.14 / np.sqrt(len(curves))
-    for row, axis in enumerate(axes, 1):
+    for row, axis in enumerate(axes):
         bands = [trace for one in curves for trace in _band(scene, one, axis, points, opacity)]
-        lines = [_line(scene, one, axis, points, legend=row == 1) for one in curves]
-        figure.add_traces([*bands, *lines], rows=row, cols=1)
+        lines = [_line(scene, one, axis, points, legend=row == 0) for one in curves]
+        figure.add([*bands, *lines], row)
     mark_time(figure, scene.duration, scene.shades)
     return finish(figure, height=120 + 175 * len(axes))
 
@@ -83,12 +80,10 @@ def _axes_to_draw(curves: Sequence[Curves]) -> list[int]:
     return known or [0, 1, 2]
 
 
-def _line(scene: Scene, curves: Curves, axis: int, points: int, legend: bool) -> Any:
-    from plotly.graph_objects import Scatter
-
+def _line(scene: Scene, curves: Curves, axis: int, points: int, legend: bool) -> Trace:
     run = curves.run
     drawn = kept_for_display(curves.errors[:, [axis]], points)
-    return Scatter(
+    return scatter(
         x=scene.since_start(run.solution.time[drawn]),
         y=curves.errors[drawn, axis].astype(np.float32),
         name=run.label,
@@ -99,13 +94,11 @@ def _line(scene: Scene, curves: Curves, axis: int, points: int, legend: bool) ->
     )
 
 
-def _band(scene: Scene, curves: Curves, axis: int, points: int, opacity: float) -> Iterator[Any]:
-    from plotly.graph_objects import Scatter
-
+def _band(scene: Scene, curves: Curves, axis: int, points: int, opacity: float) -> Iterator[Trace]:
     run = curves.run
     drawn = kept_for_display(curves.std[:, [axis]], points)
-    for sign, fill in ((1.0, None), (-1.0, "tonexty")):
-        yield Scatter(
+    for sign, fill in ((1.0, "none"), (-1.0, "tonexty")):
+        yield scatter(
             x=scene.since_start(run.solution.time[drawn]),
             y=(sign * 3.0 * curves.std[drawn, axis]).astype(np.float32),
             legendgroup=run.label,

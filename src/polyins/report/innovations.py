@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.report.decimation import kept_for_display, points_per_trace
+from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.palette import REJECTED, transparent
 from polyins.report.scene import Run, Scene
 from polyins.report.style import choose, finish, mark_time, stacked
 from polyins.solution import Innovations
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 Array = NDArray[np.float64]
 
@@ -39,12 +37,12 @@ def innovation_figure(scene: Scene) -> Figure | None:
     for index, run in enumerate(runs):
         for row in range(len(AXES)):
             traces = [_three_sigma(scene, run, row, points), *_residuals(scene, run, row, limits[row], points)]
-            figure.add_traces(traces, rows=row + 1, cols=1)
+            figure.add(traces, row)
             owners += [index] * len(traces)
     mark_time(figure, scene.duration, scene.shades)
     finish(figure, height=640)
-    for row, limit in enumerate(limits, start=1):
-        figure.update_yaxes(range=[-1.05 * limit, 1.05 * limit], row=row)
+    for axis, limit in zip(figure.axes("y"), limits, strict=True):
+        axis["range"] = [-1.05 * limit, 1.05 * limit]
     choose(figure, [run.label for run in runs], owners)
     return figure
 
@@ -58,10 +56,8 @@ def _limits(innovations: Innovations) -> Array:
     return np.asarray(np.fmin(1.5 * np.quantile(reach, USUAL, axis=0), reach.max(axis=0)), dtype=float)
 
 
-def _three_sigma(scene: Scene, run: Run, row: int, points: int) -> Any:
+def _three_sigma(scene: Scene, run: Run, row: int, points: int) -> Trace:
     """Draw a bar for each fix, not a band: between fixes, above all in outages, nothing was predicted."""
-    from plotly.graph_objects import Scatter
-
     innovations = run.solution.innovations
     drawn = kept_for_display(innovations.std[:, [row]], points)
     bars = {
@@ -70,7 +66,7 @@ def _three_sigma(scene: Scene, run: Run, row: int, points: int) -> Any:
         "thickness": float(np.clip(900.0 / drawn.size, 1.0, 5.0)),
         "width": 0,
     }
-    return Scatter(
+    return scatter(
         x=scene.since_start(innovations.time[drawn]),
         y=np.zeros(drawn.size, dtype=np.float32),
         error_y=bars,
@@ -83,7 +79,7 @@ def _three_sigma(scene: Scene, run: Run, row: int, points: int) -> Any:
     )
 
 
-def _residuals(scene: Scene, run: Run, row: int, limit: float, points: int) -> Iterator[Any]:
+def _residuals(scene: Scene, run: Run, row: int, limit: float, points: int) -> Iterator[Trace]:
     accepted = run.solution.innovations.accepted
     circle = {"color": run.colour, "size": 3.5}
     cross = {"color": REJECTED, "size": 9, "symbol": "x-thin", "line": {"color": REJECTED, "width": 2}}
@@ -94,13 +90,11 @@ def _residuals(scene: Scene, run: Run, row: int, limit: float, points: int) -> I
 
 def _markers(
     scene: Scene, run: Run, row: int, limit: float, points: int, chosen: NDArray[np.bool_], **style: Any
-) -> Any:
-    from plotly.graph_objects import Scatter
-
+) -> Trace:
     innovations = run.solution.innovations
     residual = innovations.residual[chosen, row]
     drawn = kept_for_display(residual[:, None], points)
-    return Scatter(
+    return scatter(
         x=scene.since_start(innovations.time[chosen][drawn]),
         y=np.clip(residual[drawn], -limit, limit).astype(np.float32),
         customdata=residual[drawn].astype(np.float32),

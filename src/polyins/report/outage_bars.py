@@ -2,37 +2,36 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from polyins.report.figure import Figure, Trace
 from polyins.report.scene import Run, Scene
 from polyins.report.style import finish
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 
 def outage_figure(scene: Scene) -> Figure | None:
     """Draw the bars; None without outages or without a figure for any of them."""
-    from plotly.graph_objects import Bar, Figure
-
     if not any(value is not None for run in scene.runs for value in run.summary["outages"]["each_m"]):
         return None
     intervals = [f"{begin:.1f} s to {end:.1f} s" for begin, end in scene.outages]
-    bars = [
-        Bar(
-            x=list(range(1, len(intervals) + 1)),
-            y=run.summary["outages"]["each_m"],
-            name=_label(run),
-            marker={"color": run.colour, "line": {"width": 0}},
-            customdata=intervals,
-            hovertemplate="%{y:.2f} m<br>outage %{x}, %{customdata}",
-        )
+    bars: list[Trace] = [
+        {
+            "type": "bar",
+            "x": list(range(1, len(intervals) + 1)),
+            "y": run.summary["outages"]["each_m"],
+            "name": _label(run),
+            "marker": {"color": run.colour, "line": {"width": 0}},
+            "customdata": intervals,
+            "hovertemplate": "%{y:.2f} m<br>outage %{x}, %{customdata}",
+        }
         for run in scene.runs
     ]
     figure = finish(Figure(bars), height=380)
-    figure.update_layout(barmode="group", bargap=max(0.25, 0.8 - 0.05 * len(intervals) * len(bars)))
-    figure.update_xaxes(title_text="outage", tickformat="d", nticks=min(30, len(intervals) + 1), showgrid=False)
-    figure.update_yaxes(title_text="max. horizontal error (m)", rangemode="tozero")
+    ticks = min(30, len(intervals) + 1)
+    figure.update_layout(
+        barmode="group",
+        bargap=max(0.25, 0.8 - 0.05 * len(intervals) * len(bars)),
+        xaxis={"title": {"text": "outage"}, "tickformat": "d", "nticks": ticks, "showgrid": False},
+        yaxis={"title": {"text": "max. horizontal error (m)"}, "rangemode": "tozero"},
+    )
     return figure
 
 

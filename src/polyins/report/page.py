@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from polyins import __version__
 from polyins.evaluation.summary import Document
@@ -12,6 +13,7 @@ from polyins.io.files import whole
 from polyins.recording import Recording
 from polyins.report.drift_curves import drift_figure
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
+from polyins.report.figure import Figure, as_script
 from polyins.report.imu_errors import imu_error_figure
 from polyins.report.innovations import innovation_figure
 from polyins.report.outage_bars import outage_figure
@@ -19,9 +21,6 @@ from polyins.report.scene import Scene
 from polyins.report.tables import facts, figures_table, warnings_by_text
 from polyins.report.trajectory import trajectory_figure
 from polyins.solution import Solution
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 BANDS = "Bands are three times the standard deviation that the filter states."
 
@@ -51,6 +50,7 @@ WIDE = ("imus",)
 """figures that scroll sideways on a narrow screen"""
 NO_BUTTONS = ("sendChartToCloud", "select2d", "lasso2d")
 """what would send the figure to a server, or has no use here"""
+SETTINGS = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": NO_BUTTONS}
 
 
 def write_report(
@@ -88,7 +88,8 @@ def _sections(scene: Scene) -> list[dict[str, Any]]:
             "id": name,
             "title": title,
             "caption": f"{caption} {shaded}" if name in OVER_TIME else caption,
-            "plot": _html(figure, name),
+            "height": figure.layout["height"],
+            "plot": ", ".join(as_script(part) for part in (figure.data, figure.layout, SETTINGS)),
             "wide": name in WIDE,
         }
         for name, title, caption, figure in drawn
@@ -103,17 +104,12 @@ def _what_is_shaded(scene: Scene) -> str:
     return f"{outages} {gaps}".strip()
 
 
-def _html(figure: Figure, name: str) -> str:
-    config = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": NO_BUTTONS}
-    text: str = figure.to_html(full_html=False, include_plotlyjs=False, div_id=f"plot-{name}", config=config)
-    return text
-
-
 def _plotly_script() -> str:
-    from plotly.offline import get_plotlyjs
-
-    text: str = get_plotlyjs()
-    return text
+    # the package is not imported for the sake of one of its files
+    package = find_spec("plotly")
+    assert package
+    assert package.origin
+    return (Path(package.origin).parent / "package_data" / "plotly.min.js").read_text(encoding="utf-8")
 
 
 def _template() -> Any:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from polyins.report.figure import Figure, axis_name, panels
 from polyins.report.scene import Shade
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 INK = "#1F2430"
@@ -27,62 +24,59 @@ AXES = {
 }
 
 
+LOOK = {
+    "layout": {
+        "font": {"family": FONT, "size": 12.5, "color": INK},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "margin": {"l": 64, "r": 16, "t": 16, "b": 48},
+        "legend": {
+            "orientation": "h",
+            "x": 0.0,
+            "y": 1.02,
+            "yanchor": "bottom",
+            "groupclick": "togglegroup",
+            "itemsizing": "constant",
+        },
+        "hoverlabel": {"font": {"family": FONT}},
+        "hovermode": "closest",
+        "showlegend": True,
+        "xaxis": AXES,
+        "yaxis": AXES,
+    }
+}
+"""Plotly's template of all figures"""
+
+
 def finish(figure: Figure, height: int) -> Figure:
-    """Give the figure the page's look."""
-    figure.update_layout(height=height, template=_look())
+    """Give the figure, which may also be one of Plotly's own, the page's look."""
+    figure.update_layout(height=height, template=LOOK)
     return figure
 
 
-@cache
-def _look() -> Any:
-    """Return the template of all figures, which is validated once and not figure by figure."""
-    from plotly.graph_objects import layout
-
-    return layout.Template(
-        layout={
-            "font": {"family": FONT, "size": 12.5, "color": INK},
-            "paper_bgcolor": "white",
-            "plot_bgcolor": "white",
-            "margin": {"l": 64, "r": 16, "t": 16, "b": 48},
-            "legend": {
-                "orientation": "h",
-                "x": 0.0,
-                "y": 1.02,
-                "yanchor": "bottom",
-                "groupclick": "togglegroup",
-                "itemsizing": "constant",
-            },
-            "hoverlabel": {"font": {"family": FONT}},
-            "hovermode": "closest",
-            "showlegend": True,
-            "xaxis": AXES,
-            "yaxis": AXES,
-        }
-    )
-
-
-def stacked(rows: Sequence[str], columns: int = 1, column_titles: Sequence[str] | None = None) -> Figure:
+def stacked(rows: Sequence[str], columns: Sequence[str] = ("",)) -> Figure:
     """Return an empty figure of rows that share the time axis, each with its title (with the unit) on the left."""
-    from plotly.subplots import make_subplots
-
-    figure = make_subplots(
-        rows=len(rows),
-        cols=columns,
-        shared_xaxes="all",
-        vertical_spacing=0.035,
-        horizontal_spacing=0.07,
-        column_titles=column_titles,
-    )
-    for row, title in enumerate(rows, start=1):
-        figure.update_yaxes(title_text=title, row=row, col=1)
-    figure.update_xaxes(title_text=TIME_TITLE, row=len(rows))
+    figure = panels(len(rows), len(columns), between_rows=0.035, between_columns=0.07)
+    x_axes, y_axes = figure.axes("x"), figure.axes("y")
+    for axis, title in zip(y_axes[:: len(columns)], rows, strict=True):
+        axis["title"] = {"text": title}
+    for axis in x_axes[-len(columns) :]:
+        axis["title"] = {"text": TIME_TITLE}
+    headings = [_heading(title, axis["domain"]) for title, axis in zip(columns, x_axes, strict=False) if title]
+    figure.update_layout(annotations=headings)
     return figure
+
+
+def _heading(title: str, domain: Sequence[float]) -> dict[str, Any]:
+    place = {"x": sum(domain) / 2.0, "xref": "paper", "y": 1.0, "yref": "paper", "yanchor": "bottom", "yshift": 2}
+    return {"text": title, "showarrow": False, "font": {"size": 16}, **place}
 
 
 def mark_time(figure: Figure, duration: float, shades: Sequence[Shade], columns: int = 1) -> None:
     """Let the time axes span the run, and shade what is marked behind all rows of each column."""
-    figure.update_xaxes(range=[0.0, duration])
-    axes = ["x", *(f"x{column}" for column in range(2, columns + 1))]
+    for axis in figure.axes("x"):
+        axis["range"] = [0.0, duration]
+    axes = [axis_name("x", column) for column in range(columns)]
     figure.update_layout(shapes=[_rectangle(shade, axis) for shade in shades for axis in axes])
 
 
@@ -111,7 +105,7 @@ def choose(figure: Figure, labels: Sequence[str], owners: Sequence[int], first: 
         for choice, label in enumerate(labels)
     ]
     for trace, owner in zip(figure.data, owners, strict=True):
-        trace.visible = owner == first
+        trace["visible"] = owner == first
     figure.update_layout(
         legend={"y": 0.0, "yref": "container", "yanchor": "bottom"},
         margin={"t": 72 if len(labels) > 1 else 56, "b": 100},

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.geodesy import displacement
 from polyins.report.decimation import kept_for_display
+from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.palette import FIXES, OUTAGE_TRACK, REFERENCE, REJECTED
 from polyins.report.scene import Run, Scene
 from polyins.report.style import finish
 from polyins.solution import Innovations
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 Array = NDArray[np.float64]
 
@@ -24,12 +22,12 @@ POINTS = 4000
 
 def trajectory_figure(scene: Scene) -> Figure:
     """Draw east against north, m from the first solution's start, with equal scales."""
-    from plotly.graph_objects import Figure
-
     figure = Figure([*_outages(scene), *_fixes(scene), *_reference(scene), *_solutions(scene), *_rejected(scene)])
     finish(figure, height=600)
-    figure.update_xaxes(title_text="east (m)")
-    figure.update_yaxes(title_text="north (m)", scaleanchor="x", scaleratio=1.0)
+    figure.update_layout(
+        xaxis={"title": {"text": "east (m)"}},
+        yaxis={"title": {"text": "north (m)"}, "scaleanchor": "x", "scaleratio": 1.0},
+    )
     return figure
 
 
@@ -39,14 +37,12 @@ def _track(scene: Scene, position: Array) -> Array:
     return displacement(position, scene.origin, geodetic)[:, [1, 0]]
 
 
-def _points(track: Array, **style: Any) -> Any:
-    from plotly.graph_objects import Scatter
-
+def _points(track: Array, **style: Any) -> Trace:
     east, north = track.astype(np.float32).T
-    return Scatter(x=east, y=north, **style)
+    return scatter(x=east, y=north, **style)
 
 
-def _line(track: Array, **style: Any) -> Any:
+def _line(track: Array, **style: Any) -> Trace:
     return _points(track[kept_for_display(track, POINTS)], mode="lines", **style)
 
 
@@ -57,7 +53,7 @@ def _known_track(scene: Scene) -> tuple[Array, Array]:
     return (first.time, first.position) if reference is None else (reference.time, reference.position)
 
 
-def _outages(scene: Scene) -> list[Any]:
+def _outages(scene: Scene) -> list[Trace]:
     if not scene.recording.outages:
         return []
     time, position = _known_track(scene)
@@ -69,7 +65,7 @@ def _outages(scene: Scene) -> list[Any]:
     return [_line(track, name="GNSS outage", line=style, hoverinfo="skip")]
 
 
-def _fixes(scene: Scene) -> list[Any]:
+def _fixes(scene: Scene) -> list[Trace]:
     gnss = scene.recording.gnss
     if gnss is None:
         return []
@@ -78,7 +74,7 @@ def _fixes(scene: Scene) -> list[Any]:
     return [_points(track, name="GNSS fixes", mode="markers", marker={"color": FIXES, "size": 3}, hoverinfo="skip")]
 
 
-def _reference(scene: Scene) -> list[Any]:
+def _reference(scene: Scene) -> list[Trace]:
     reference = scene.recording.reference
     if reference is None:
         return []
@@ -86,16 +82,16 @@ def _reference(scene: Scene) -> list[Any]:
     return [_line(track, name="reference", line={"color": REFERENCE, "width": 1.4})]
 
 
-def _solutions(scene: Scene) -> list[Any]:
+def _solutions(scene: Scene) -> list[Trace]:
     return [_solution(scene, run) for run in scene.runs]
 
 
-def _solution(scene: Scene, run: Run) -> Any:
+def _solution(scene: Scene, run: Run) -> Trace:
     track = _track(scene, scene.at_reference_point(run))
     return _line(track, name=run.label, line={"color": run.colour, "dash": run.dash, "width": 1.8})
 
 
-def _rejected(scene: Scene) -> list[Any]:
+def _rejected(scene: Scene) -> list[Trace]:
     """Mark each fix that any run rejected, and say in its label by which."""
     gnss = scene.recording.gnss
     by_time: dict[float, list[str]] = {}

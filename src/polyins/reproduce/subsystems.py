@@ -10,7 +10,7 @@ import numpy as np
 
 from polyins.evaluation.errors import Errors
 from polyins.report.palette import FEW_IMUS
-from polyins.report.style import finish, stacked
+from polyins.report.style import TIME_TITLE, finish
 from polyins.reproduce.b4 import EXPERIMENT, SEED, SETTINGS
 from polyins.reproduce.pictures import write_figure
 from polyins.reproduce.robot import figures, score, solve
@@ -85,8 +85,12 @@ def _heading_deg(errors: Errors) -> Any:
 def picture(errors: Mapping[str, Errors]) -> Any:
     """Return the picture: horizontal error, m, over heading error, deg."""
     from plotly.graph_objects import Scatter
+    from plotly.subplots import make_subplots
 
-    figure = stacked(["horizontal error (m)", "heading error (deg)"])
+    figure = make_subplots(rows=2, cols=1, shared_xaxes="all", vertical_spacing=0.035)
+    figure.update_yaxes(title_text="horizontal error (m)", row=1)
+    figure.update_yaxes(title_text="heading error (deg)", row=2)
+    figure.update_xaxes(title_text=TIME_TITLE, row=2)
     for k, (name, one) in enumerate(errors.items()):
         time = (one.time - one.time[0])[::EVERY]
         line = {"color": FEW_IMUS[k], "width": 2.8 if k == 0 else 1.2}
