@@ -28,6 +28,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import click
 import numpy as np
 import pytest
+from described_keys import descriptions
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
@@ -494,8 +495,9 @@ def shown(field: Any, model: type[BaseModel]) -> str:
 
 def table(title: str, model: type[BaseModel]) -> str:
     hints = get_type_hints(model, include_extras=True)
+    described = descriptions(model)
     rows = [
-        f"| `{name}` | {kind(hints[name])} | {shown(field, model)} | {field.description} |"
+        f"| `{name}` | {kind(hints[name])} | {shown(field, model)} | {described[name]} |"
         for name, field in model.model_fields.items()
     ]
     return "\n".join([f"### {title}\n", "| key | value | default | what it is |", "|---|---|---|---|", *rows])

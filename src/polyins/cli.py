@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import traceback
 from collections.abc import Callable
@@ -21,6 +22,9 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
 SECONDS = click.FloatRange(0.0, 1e6)
 RATE = click.FloatRange(0.0, 1e4, min_open=True)
+
+COLLECT_AFTER = 300_000
+"""new objects before Python looks for garbage: a start imports nearly as many, and all of them stay"""
 
 as_json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document and nothing else.")
 no_report_option = click.option("--no-report", is_flag=True, help="Leave out report.html.")
@@ -97,6 +101,7 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     from polyins.evaluation.summary import summarize
     from polyins.methods import find_method
 
+    gc.set_threshold(COLLECT_AFTER)
     if method is not None:
         find_method(method)
     if imu is not None and method not in (None, "single"):

@@ -92,9 +92,7 @@ def blame(key: str, problem: str) -> PydanticCustomError:
 class Section(BaseModel):
     """A mapping in the file."""
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True, defer_build=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
