@@ -79,6 +79,27 @@ def test_compare_sets_every_method_beside_the_single_imus(config: Path, tmp_path
     assert (tmp_path / "report.html").stat().st_size > 1e6
 
 
+def test_several_recordings_have_a_folder_each_and_one_document(config: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other" / config.name
+    other.parent.mkdir()
+    other.write_text(config.read_text().replace("file: ", f"file: {config.parent}/"))
+    out = tmp_path / "out"
+    done = polyins("compare", config, other, "--methods", "enav-fusion", "--out", out, "--json", "--no-report")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert json.loads((out / "summary.json").read_text()) == document
+    assert list(document["recordings"]) == [f"{path.parent.name}/simulated drive" for path in (config, other)]
+    for name, part in document["recordings"].items():
+        assert json.loads((out / name / "summary.json").read_text()) == part
+        assert (out / name / "enav-fusion/solution.parquet").is_file()
+    one, two = (part["methods"]["enav-fusion"]["reference"] for part in document["recordings"].values())
+    assert one == two == document["pooled"]["methods"]["enav-fusion"]["reference"]
+    again = polyins("compare", config, config, "--out", tmp_path / "twice")
+    assert again.returncode == 2
+    assert "differ in name" in again.stderr
+    assert not (tmp_path / "twice").exists()
+
+
 def test_evaluate_finds_the_figures_of_the_run(config: Path, tmp_path: Path) -> None:
     run = json.loads(polyins("run", config, "--out", tmp_path, "--json", "--no-report").stdout)
     done = polyins("evaluate", tmp_path, "--reference", config.parent / "reference.parquet", "--json")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 
 import numpy as np
 import pytest
 
-from polyins.comparison import compare
+from polyins.comparison import compare, compare_several
+from polyins.errors import InputError
+from polyins.evaluation.summary import rms
 from polyins.parallel import run_all
 from polyins.simulation.scenario import Board, Scenario, simulate
 
@@ -71,3 +75,71 @@ def test_a_comparison_in_threads_is_that_on_one_core():
     for name, solution in (one.solutions | one.each).items():
         np.testing.assert_array_equal(solution.position, (two.solutions | two.each)[name].position)
     assert one.document["ratio_to_single"] == two.document["ratio_to_single"]
+
+
+SEEDS = {f"seed {k}": k for k in (1, 2, 3)}
+METHODS = ["single", "enav-fusion"]
+
+
+def recording_of(seed):
+    drive = Scenario(
+        duration_s=60.0, static_s=20.0, imus=Board(count=2), outages=((40.3, 50.3),), reference_rate_hz=10.0
+    )
+    return simulate(drive, seed=seed)
+
+
+def test_several_recordings_give_what_each_gives_alone():
+    solutions, told = {}, []
+
+    def take(name, recording, result):
+        solutions[name] = result.solutions
+
+    readers = {name: lambda seed=seed: recording_of(seed) for name, seed in SEEDS.items()}
+    document = compare_several(readers, take, METHODS, threads=2, progress=told.append)
+    assert list(document["recordings"]) == list(SEEDS)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    for name, seed in SEEDS.items():
+        alone = compare(recording_of(seed), METHODS, threads=1)
+        assert document["recordings"][name]["ratio_to_single"] == alone.document["ratio_to_single"]
+        for method, solution in alone.solutions.items():
+            np.testing.assert_array_equal(solution.position, solutions[name][method].position)
+    parts = [part["methods"] for part in document["recordings"].values()]
+    pooled = document["pooled"]
+    for method in METHODS:
+        maxima = [part[method]["outages"]["each_m"][0] for part in parts]
+        assert pooled["methods"][method]["outages"]["horizontal_max_rms_m"] == pytest.approx(rms(np.array(maxima)))
+        errors = np.array([part[method]["reference"]["horizontal_rms_m"] for part in parts])
+        assert pooled["methods"][method]["reference"]["horizontal_rms_m"] == pytest.approx(rms(errors))
+    single, fused = (pooled["methods"][method]["outages"]["horizontal_max_rms_m"] for method in METHODS)
+    assert pooled["ratio_to_single"] == {"enav-fusion": pytest.approx(single / fused)}
+
+
+def test_a_recording_is_let_go_before_the_one_after_the_next_is_read():
+    alive, most = [], []
+
+    def read():
+        gc.collect()
+        most.append(sum(one() is not None for one in alive))
+        recording = recording_of(len(alive))
+        alive.append(weakref.ref(recording))
+        return recording
+
+    compare_several({str(k): read for k in range(5)}, lambda *_: None, METHODS, threads=1)
+    assert len(most) == 5
+    assert max(most) <= 1
+
+
+def test_a_recording_that_cannot_be_read_ends_all_with_its_error():
+    read = []
+
+    def fails():
+        raise InputError("b.yaml: no such file")
+
+    def good():
+        read.append(1)
+        return recording_of(1)
+
+    with pytest.raises(InputError, match="no such file"):
+        compare_several({"a": good, "b": fails, "c": good, "d": good}, lambda *_: None, METHODS, threads=2)
+    assert len(read) <= 2

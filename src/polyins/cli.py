@@ -6,6 +6,7 @@ import gc
 import sys
 import traceback
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -151,42 +152,85 @@ def _imu_index(names: list[str], wanted: str | None) -> int:
 
 
 @cli.command()
-@click.argument("config", type=FILE)
+@click.argument("configs", metavar="CONFIG...", type=FILE, nargs=-1, required=True)
 @click.option("--methods", default=None, help="Names separated by commas; unless given all that the rig allows.")
 @click.option("--threads", type=click.IntRange(1), default=None, help="Runs at once; one for each core unless given.")
 @out_option("polyins-out")
 @as_json_option
 @no_report_option
-def compare(config: Path, methods: str | None, threads: int | None, out: Path, as_json: bool, no_report: bool) -> None:
-    """Run several methods over one recording, and each IMU on its own."""
-    _compare(config, methods, out, as_json, report=not no_report, threads=threads)
+def compare(
+    configs: tuple[Path, ...], methods: str | None, threads: int | None, out: Path, as_json: bool, no_report: bool
+) -> None:
+    """Run several methods over one recording or more, and each IMU on its own."""
+    from polyins.methods import find_method
+
+    gc.set_threshold(COLLECT_AFTER)
+    names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else None
+    if len(configs) > 1:
+        _compare_several(configs, names, out, as_json, report=not no_report, threads=threads)
+    else:
+        _compare(configs[0], names, out, as_json, report=not no_report, threads=threads)
 
 
 def _compare(
-    config: Path, methods: str | None, out: Path, as_json: bool, report: bool, threads: int | None = None
+    config: Path, methods: list[str] | None, out: Path, as_json: bool, report: bool, threads: int | None = None
 ) -> None:
     from polyins import results
     from polyins.comparison import compare as run_all
     from polyins.loading import load
-    from polyins.methods import find_method
 
-    names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else None
     with progress("reading"):
         recording = load(config)
     results.make_folder(out)
     with compilation_said(), progress("compare") as update:
-        result = run_all(recording, names, threads=threads, progress=update)
+        result = run_all(recording, methods, threads=threads, progress=update)
     with progress("writing"):
         results.write_comparison(out, recording, result, report=report)
     if as_json:
         print(results.as_json(result.document))
         return
-    alone = "wheel-ins" if recording.rig.rolling else "single"
-    title = f"{recording.name}; {alone}: rms over {len(result.each)} "
-    # on a vehicle nothing says that N modules are better by that much
-    title += "wheels" if recording.rig.rolling else f"IMUs; sqrt(N) = {result.document['sqrt_n']:.2f}"
-    print_summaries(title, result.document["methods"], result.document["ratio_to_single"])
+    _print_comparison(recording.name, result.document)
     say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
+
+
+def _compare_several(
+    configs: tuple[Path, ...], methods: list[str] | None, out: Path, as_json: bool, report: bool, threads: int | None
+) -> None:
+    from polyins import results
+    from polyins.comparison import Comparison, compare_several
+    from polyins.loading import load_settings, names_of, read_config
+
+    settings = [read_config(config) for config in configs]
+    readers = {name: partial(load_settings, one) for name, one in zip(names_of(settings), settings, strict=True)}
+    results.make_folder(out)
+
+    def write(name: str, recording: Recording, result: Comparison) -> None:
+        results.make_folder(out / name)
+        results.write_comparison(out / name, recording, result, report=report)
+
+    with compilation_said(), progress("compare") as update:
+        document = compare_several(readers, write, methods, threads=threads, progress=update)
+    results.write_document(out / "summary.json", document)
+    if as_json:
+        print(results.as_json(document))
+        return
+    for name, part in document["recordings"].items():
+        _print_comparison(name, part)
+    pooled = document["pooled"]
+    print_summaries(f"over {len(configs)} recordings", pooled["methods"], pooled["ratio_to_single"])
+    say(f"files: {out}" + (f", reports: {out / '*' / 'report.html'}" if report else ""))
+
+
+def _print_comparison(name: str, document: dict[str, Any]) -> None:
+    from polyins.evaluation.summary import on_wheels
+
+    methods = document["methods"]
+    alone, each = next(((key, one["each"]) for key, one in methods.items() if "each" in one), ("", ()))
+    wheels = any(map(on_wheels, methods.values()))
+    title = f"{name}; {alone}: rms over {len(each)} "
+    # on a vehicle nothing says that N modules are better by that much
+    title += "wheels" if wheels else f"IMUs; sqrt(N) = {document['sqrt_n']:.2f}"
+    print_summaries(title, methods, document["ratio_to_single"])
 
 
 @cli.command()

@@ -1,22 +1,26 @@
-"""Several methods over one recording, with every single IMU as the yardstick."""
+"""Several methods over one recording or several, with every single IMU as the yardstick."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from polyins import batch
+from polyins import __version__, batch
 from polyins.errors import InputError
-from polyins.evaluation.summary import comparison, summarize
+from polyins.evaluation.summary import comparison, over_recordings, summarize
 from polyins.methods import ARRAY_METHODS, find_method
 from polyins.modules import available
-from polyins.parallel import Progress, run_all
+from polyins.parallel import Progress, cores, run_all
 from polyins.recording import Recording
 from polyins.solution import Solution
 
 Document = dict[str, Any]
+
+RECORDINGS_AT_ONCE = 2
+"""one is read or written while the methods run over the other"""
 
 
 @dataclass(frozen=True)
@@ -36,11 +40,13 @@ def compare(
     methods: Sequence[str] | None = None,
     *,
     threads: int | None = None,
+    pool: ThreadPoolExecutor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
     """Run every method, or all that the rig allows, and each IMU on its own: on a vehicle each wheel that gives speed.
 
-    The runs share the cores, or as many threads as are given; the solutions are the same with any number of them.
+    The runs share the cores, or as many threads as are given, or a `pool` with other comparisons; the solutions are the
+    same with any number of them.
     `progress` is called with the share of all runs that is done. Raises InputError for an unknown method, before
     anything runs.
     """
@@ -57,7 +63,7 @@ def compare(
     # those of the array take longest
     order = [*((name, 0) for name in arrays), *alone_runs]
     jobs = [partial(_run, recording, name, imu) for name, imu in order]
-    done = run_all(jobs, threads=threads, progress=progress)
+    done = run_all(jobs, threads=threads, pool=pool, progress=progress)
     each = dict(zip(names, done[len(arrays) :], strict=True))
     runs = {alone: next(iter(each.values()))} if alone in methods else {}
     runs |= dict(zip(arrays, done, strict=False))
@@ -68,6 +74,36 @@ def compare(
             {name: summary for name, (_, summary) in runs.items()}, [summary for _, summary in each.values()], alone
         ),
     )
+
+
+def compare_several(
+    recordings: Mapping[str, Callable[[], Recording]],
+    take: Callable[[str, Recording, Comparison], None],
+    methods: Sequence[str] | None = None,
+    *,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Document:
+    """Compare the methods over several recordings, by name what reads each; return the document of all.
+
+    All runs share the threads. A recording is read when its turn comes and let go once `take` has taken what came out,
+    so that two of them are in memory at most. Every recording counts the same in `progress`.
+    """
+
+    def one(name: str, tell: Progress) -> Document:
+        recording = recordings[name]()
+        result = compare(recording, methods, pool=pool, progress=tell)
+        take(name, recording, result)
+        return result.document
+
+    with ThreadPoolExecutor(threads or cores()) as pool:
+        jobs = [partial(one, name) for name in recordings]
+        documents = run_all(jobs, threads=RECORDINGS_AT_ONCE, progress=progress)
+    return {
+        "polyins": __version__,
+        "recordings": dict(zip(recordings, documents, strict=True)),
+        "pooled": over_recordings(documents),
+    }
 
 
 def _run(recording: Recording, method: str, imu: int, tell: Progress) -> tuple[Solution, Document]:

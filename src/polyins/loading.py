@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,26 @@ def read_config(path: str | Path) -> Settings:
             document = Document(document.path, values)
             break
     return _located(document), document, warnings
+
+
+def names_of(settings: Sequence[Settings]) -> list[str]:
+    """Return a name for each of several configurations: its own, after that of its folder where they share one.
+
+    Raises InputError if two are still the same, or one cannot name a folder.
+    """
+    own = [config.name for config, _, _ in settings]
+    names: dict[str, Path] = {}
+    for name, (_, document, _) in zip(own, settings, strict=True):
+        path = document.path.resolve()
+        if Path(name).name != name:
+            raise InputError(f"{document.place(['name'])}: is {name!r}; expected what may be the name of a folder")
+        longer = name if own.count(name) == 1 else f"{path.parent.name}/{name}"
+        if longer in names:
+            raise InputError(
+                f"{path}: is named {longer!r} as is {names[longer]}; expected recordings that differ in name"
+            )
+        names[longer] = path
+    return list(names)
 
 
 def load_document(document: Document) -> Recording:

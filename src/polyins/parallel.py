@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from threading import Lock
 from typing import TypeVar
@@ -22,12 +22,16 @@ def cores() -> int:
 
 
 def run_all(
-    jobs: Sequence[Job[Result]], *, threads: int | None = None, progress: Progress | None = None
+    jobs: Sequence[Job[Result]],
+    *,
+    threads: int | None = None,
+    pool: ThreadPoolExecutor | None = None,
+    progress: Progress | None = None,
 ) -> list[Result]:
     """Do all jobs, as many at once as there are cores unless `threads` says how many; return results in their order.
 
-    `progress` is told the mean share of all. The error of the job that fails first is raised; jobs that run then stop
-    at their next report, and those that wait do not begin.
+    With a `pool` they share its threads with the jobs of others. `progress` is told the mean share of all. The error of
+    the job that fails first is raised; jobs that run then stop at their next report, and those that wait do not begin.
     """
     board = _Board(len(jobs), progress)
 
@@ -35,13 +39,14 @@ def run_all(
         with board.failures():
             return job(partial(board.tell, number))
 
-    with ThreadPoolExecutor(max(1, threads or cores())) as pool:
-        futures = [pool.submit(do, number, job) for number, job in enumerate(jobs)]
+    with nullcontext(pool) if pool else ThreadPoolExecutor(max(1, threads or cores())) as workers:
+        futures = [workers.submit(do, number, job) for number, job in enumerate(jobs)]
         try:
             return [future.result() for future in futures]
         except BaseException as error:
             board.failure = board.failure or error
-            pool.shutdown(wait=False, cancel_futures=True)
+            for future in futures:
+                future.cancel()
             raise board.failure from None
 
 

@@ -113,7 +113,7 @@ def print_summaries(title: str, summaries: Mapping[str, Mapping[str, Any]], rati
             for row, value in zip(cells, values, strict=True):
                 row.append(number(value, digits))
     if ratios:
-        alone = next((name for name, summary in summaries.items() if "each" in summary), "single")
+        alone = next((name for name in summaries if name not in ratios), "single")
         columns.append(f"ratio to\n{alone}")
         for row in cells:
             row.append("1" if row[0] == alone else number(ratios.get(row[0]), 2))
@@ -122,7 +122,7 @@ def print_summaries(title: str, summaries: Mapping[str, Mapping[str, Any]], rati
         gnss = summary["gnss"]
         if gnss["rejected"]:
             say(f"{name}: {gnss['rejected']} of {gnss['fixes']} GNSS fixes rejected")
-    for text in dict.fromkeys(text for summary in summaries.values() for text in summary["warnings"]):
+    for text in dict.fromkeys(text for summary in summaries.values() for text in summary.get("warnings", ())):
         say(f"warning: {text}")
 
 

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Document = dict[str, Any]
 """what `json.dumps` takes, with None instead of NaN"""
 
+DRIFT = ("distance_m", "rate_percent", "end_percent")
 GNSS_COUNTS = ("fixes", "rejected", "reopened", "velocities_rejected")
 
 NEGLIGIBLE_SHARE = 0.01
@@ -134,19 +135,62 @@ def pooled(each: Sequence[Document]) -> Document:
         **first,
         **{key: _pool([summary[key] for summary in each], np.mean) for key in ("filter_s", "us_per_epoch")},
         "first_call_s": max(summary["first_call_s"] for summary in each),
-        "reference": {
-            key: _pool([summary["reference"][key] for summary in each], np.max if "_max_" in key else rms)
-            for key in first["reference"]
-        },
+        "reference": _pooled_errors(each),
         "outages": _pooled_outages([summary["outages"] for summary in each]),
         **{key: _means([summary[key] for summary in each]) for key in ("drift", "consistency")},
         "gnss": {
-            **{key: sum(summary["gnss"][key] for summary in each) for key in GNSS_COUNTS},
+            **_gnss_counts(each),
             "rejected_times_s": sorted({time for summary in each for time in summary["gnss"]["rejected_times_s"]}),
         },
         "warnings": list(dict.fromkeys(warning for summary in each for warning in summary["warnings"])),
         "each": list(each),
     }
+
+
+def over_recordings(documents: Sequence[Document]) -> Document:
+    """Return the figures of each method that all of some `compare` documents have, over all their recordings.
+
+    Errors are root mean squares (of maxima the maximum) in which every recording counts the same, and of outages every
+    outage; drift and times are means.
+    """
+    by_method = {
+        name: [document["methods"][name] for document in documents]
+        for name in documents[0]["methods"]
+        if all(name in document["methods"] for document in documents)
+    }
+    methods = {name: _over_recordings(each) for name, each in by_method.items()}
+    alone = next((methods[name] for name in ("single", "wheel-ins") if name in methods), None)
+    others = {name: summary for name, summary in methods.items() if summary is not alone}
+    return {
+        "methods": methods,
+        "ratio_to_single": {name: _ratio(figure(alone), figure(summary)) for name, summary in others.items()},
+        "time_ratio_to_single": {name: _ratio(_cost(summary), _cost(alone)) for name, summary in others.items()},
+    }
+
+
+def _over_recordings(each: Sequence[Document]) -> Document:
+    maxima = [value for summary in each for value in summary["outages"]["each_m"]]
+    return {
+        "method": each[0]["method"],
+        **{key: sum(summary[key] for summary in each) for key in ("duration_s", "epochs")},
+        "us_per_epoch": _pool([_cost(summary) for summary in each], np.mean),
+        "reference": _pooled_errors(each),
+        "outages": {"count": len(maxima), "horizontal_max_rms_m": _pool(maxima, rms)},
+        "drift": _means([{key: summary["drift"][key] for key in DRIFT} for summary in each]),
+        "consistency": _means([summary["consistency"] for summary in each]),
+        "gnss": _gnss_counts(each),
+    }
+
+
+def _pooled_errors(each: Sequence[Document]) -> Document:
+    return {
+        key: _pool([summary["reference"][key] for summary in each], np.max if "_max_" in key else rms)
+        for key in each[0]["reference"]
+    }
+
+
+def _gnss_counts(each: Sequence[Document]) -> Document:
+    return {key: sum(summary["gnss"][key] for summary in each) for key in GNSS_COUNTS}
 
 
 def figure(summary: Document | None) -> float | None:
