@@ -16,7 +16,7 @@ from playing import Event, events, feed, navigator_for, play, row, rows
 from polyins import batch
 from polyins.errors import InputError
 from polyins.navigator import Navigator
-from polyins.recording import ImuStream, Recording
+from polyins.recording import USUAL_OF, ImuStream, Recording
 from polyins.solution import Solution
 
 ARRAYS = ("single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization")
@@ -86,6 +86,17 @@ def test_so_it_is_with_velocities_and_outages() -> None:
 def test_so_it_is_with_imus_of_own_clocks(method: str) -> None:
     recording = of_own_clocks(shaken_recording(3, 4.0))
     assert_same(replayed(recording, method), batch.run(recording, method))
+
+
+def test_so_it_is_over_more_samples_than_tell_the_usual_interval() -> None:
+    """Batch takes the median of the first 10,000 intervals, live of the latest ones; here stamps jitter by a tenth."""
+    recording = of_own_clocks(shaken_recording(2, 105.0, rate_hz=100.0))
+    jitter = np.random.default_rng(4).uniform(-1e-3, 1e-3, (2, len(recording.imus[0].time)))
+    streams = [replace(imu, time=imu.time + moved) for imu, moved in zip(recording.imus, jitter, strict=True)]
+    # a batch run ends where the first of them does
+    recording = with_gap(replace(recording, imus=tuple(streams)), 0, streams[1].time[-1] - 0.02, np.inf)
+    assert len(recording.imus[0].time) > USUAL_OF
+    assert_same(replayed(recording, "enav-fusion", delay=0.1), batch.run(recording, "enav-fusion"))
 
 
 @pytest.mark.parametrize(("imus", "length"), [((1,), 0.1), ((1,), 0.6), ((0, 1, 2), 0.1)])

@@ -152,7 +152,7 @@ def _imu_index(names: list[str], wanted: str | None) -> int:
 
 
 @cli.command()
-@click.argument("configs", metavar="CONFIG...", type=FILE, nargs=-1, required=True)
+@click.argument("configs", metavar="CONFIG [CONFIG ...]", type=FILE, nargs=-1, required=True)
 @click.option("--methods", default=None, help="Names separated by commas; unless given all that the rig allows.")
 @click.option("--threads", type=click.IntRange(1), default=None, help="Runs at once; one for each core unless given.")
 @out_option("polyins-out")
