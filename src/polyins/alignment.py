@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polyins.errors import InputError
-from polyins.evaluation.attitude import quaternions, rotation_matrices
+from polyins.evaluation.attitude import (
+    euler_angles,
+    in_succession,
+    of_rotation_vectors,
+    quaternions,
+    rotation_matrices,
+)
 from polyins.geodesy import metres_per_unit
 from polyins.kernels import earth
 from polyins.recording import GnssStream, Recording, StartOptions
@@ -291,18 +297,15 @@ class _Search:
         self, begin: float, end: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float]
     ) -> float:
         """Return how far the heading turns from begin to end, from the gyros alone."""
-        from scipy.spatial.transform import Rotation
-
         if end <= begin:
             return 0.0
         bias = self._mean(*still)[0].mean(axis=0) if still else np.zeros(3)
         part = self.aligned.between(begin, end)
         known = bias + self.errors[:, :3].mean(axis=0)
         steps = part.increments[1:, :3].mean(axis=2) - known * np.diff(part.time)[:, None]
-        attitude = Rotation.from_euler("ZYX", [0.0, roll_pitch[1], roll_pitch[0]])
-        for rotation in Rotation.from_rotvec(steps):
-            attitude = attitude * rotation
-        return float(attitude.as_euler("ZYX")[0])
+        before = quaternions(np.array([[*roll_pitch, 0.0]]))
+        after = in_succession(np.concatenate([before, of_rotation_vectors(steps)]))
+        return float(euler_angles(after[None, :])[0, 2])
 
     def _position(self, time: float, attitude: Array) -> tuple[Array, Array]:
         if self.options.position is not None:

@@ -3,12 +3,16 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
 
 from polyins.evaluation.attitude import (
     angular_rate,
     euler_angles,
     euler_jacobian,
     euler_variance,
+    in_succession,
+    of_rotation_vectors,
     quaternions,
     rotation_matrices,
     wrap,
@@ -84,3 +88,12 @@ def test_angular_rate_of_a_body_at_rest_and_of_one_epoch_is_zero():
     still = np.tile([1.0, 0.0, 0.0, 0.0], (4, 1))
     np.testing.assert_array_equal(angular_rate(np.arange(4.0), still), 0.0)
     np.testing.assert_array_equal(angular_rate(np.zeros(1), still[:1]), np.zeros((1, 3)))
+
+
+@given(arrays(float, st.tuples(st.integers(1, 20), st.just(3)), elements=st.floats(-4.0, 4.0)))
+def test_rotations_in_succession_are_their_product_in_order(vectors):
+    whole = np.eye(3)
+    for vector in vectors:
+        whole = whole @ Rotation.from_rotvec(vector).as_matrix()
+    product = in_succession(of_rotation_vectors(vectors))
+    np.testing.assert_allclose(rotation_matrices(product[None, :])[0], whole, atol=1e-13)

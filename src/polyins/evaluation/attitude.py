@@ -47,6 +47,28 @@ def quaternions(euler: Array) -> Array:
     )
 
 
+def product(first: Array, second: Array) -> Array:
+    """Return the quaternions of the second rotations after the first ones, about the axes that these turned to."""
+    a, b = first[:, 1:], second[:, 1:]
+    scalar = first[:, 0] * second[:, 0] - np.sum(a * b, axis=1)
+    vector = first[:, :1] * b + second[:, :1] * a + np.cross(a, b)
+    return np.column_stack([scalar, vector])
+
+
+def of_rotation_vectors(rotations: Array) -> Array:
+    """Return the quaternions, shape (T, 4), of rotation vectors, rad, shape (T, 3)."""
+    half = 0.5 * np.linalg.norm(rotations, axis=1, keepdims=True)
+    return np.hstack([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotations])
+
+
+def in_succession(rotations: Array) -> Array:
+    """Return the product, shape (4,), of one or more quaternions in their order, shape (T, 4)."""
+    while len(rotations) > 1:  # by pairs: Python takes few steps, whatever the number
+        even = len(rotations) // 2 * 2
+        rotations = np.concatenate([product(rotations[:even:2], rotations[1:even:2]), rotations[even:]])
+    return np.asarray(rotations[0])
+
+
 def euler_jacobian(euler: Array) -> Array:
     """Return d(roll, pitch, heading)/d(phi), shape (T, 3, 3), where C = (I + phi x) C_hat in n.
 
