@@ -46,7 +46,7 @@ def _start_without_scipy() -> None:
         from numba.np import linalg
 
         ask = linalg.ensure_blas
-        linalg.ensure_blas = lambda: None
+        linalg.ensure_blas = lambda *_, **__: None
         try:
             importlib.import_module("numba.np.arraymath")
         finally:
