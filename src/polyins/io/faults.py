@@ -56,21 +56,23 @@ def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) ->
     rates = _rates(rows)
     texts = []
     for k in range(0 if gyro else 3, 6):
-        largest, distinct = np.abs(rates[:, k]).max(), rates[np.diff(rates[:, k], prepend=np.nan) != 0.0, k]
+        size = np.abs(rates[:, k])
+        largest = size.max()
+        runs = [run for run in _runs(size >= (1.0 - SAME) * largest) if run[1] - run[0] >= LEAST_CLIPPED]
+        if not runs:
+            continue
+        distinct = rates[np.diff(rates[:, k], prepend=np.nan) != 0.0, k]
         if not _is_rough(distinct[:, None], 3, DIGITS * largest):
             continue
         if largest < LEAST_STEPS * np.median(np.abs(np.diff(distinct))):
             continue
-        at_end = np.abs(rates[:, k]) >= (1.0 - SAME) * largest
-        runs = [run for run in _runs(at_end) if run[1] - run[0] >= LEAST_CLIPPED]
-        if runs:
-            size = f"{np.degrees(largest):.4g} deg/s" if k < 3 else f"{largest:.4g} m/s^2"
-            remedy = "; gyro_range_deg_s leaves such rows out" if k < 3 else ""
-            texts.append(
-                f"{rows.source.path}: {NAMES[k]} of IMU {name} stays at exactly {size}, its largest value, "
-                f"{len(runs)} time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its "
-                f"range?{remedy}"
-            )
+        value = f"{np.degrees(largest):.4g} deg/s" if k < 3 else f"{largest:.4g} m/s^2"
+        remedy = "; gyro_range_deg_s leaves such rows out" if k < 3 else ""
+        texts.append(
+            f"{rows.source.path}: {NAMES[k]} of IMU {name} stays at exactly {value}, its largest value, "
+            f"{len(runs)} time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its "
+            f"range?{remedy}"
+        )
     return tuple(texts)
 
 
@@ -102,9 +104,10 @@ def _frozen(rows: ImuRows) -> NDArray[np.bool_]:
     frozen = np.zeros(len(first), dtype=bool)
     begins = np.flatnonzero(first)
     lengths = np.diff(begins, append=len(first))
-    if not _is_rough(rates[first], 1, SAME * float(np.abs(rates).max())):
+    long = np.flatnonzero(lengths > LONGEST_REPEAT * np.median(lengths))
+    if not long.size or not _is_rough(rates[first], 1, SAME * float(np.abs(rates).max())):
         return frozen
-    for k in np.flatnonzero(lengths > LONGEST_REPEAT * np.median(lengths)):
+    for k in long:
         frozen[begins[k] + 1 : begins[k] + lengths[k]] = True
     return frozen
 
