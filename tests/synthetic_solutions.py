@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polyins.evaluation.attitude import quaternions, rotation_matrices
+from polyins.attitude import quaternions, rotation_matrices
 from polyins.geodesy import metres_per_unit
 from polyins.recording import GnssStream, ImuStream, Recording, Reference
 from polyins.rig import Imu, NoiseGrade, Rig

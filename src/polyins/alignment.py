@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polyins.errors import InputError
-from polyins.evaluation.attitude import (
+from polyins.attitude import (
     euler_angles,
     in_succession,
     of_rotation_vectors,
     quaternions,
     rotation_matrices,
 )
+from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
 from polyins.kernels import earth
 from polyins.recording import GnssStream, Recording, StartOptions

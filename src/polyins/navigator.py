@@ -53,14 +53,14 @@ class NavigatorState:
     @property
     def euler(self) -> Array:
         """Roll, pitch and heading, rad, shape (3,)."""
-        from polyins.evaluation.attitude import euler_angles
+        from polyins.attitude import euler_angles
 
         return np.asarray(euler_angles(self.attitude[None])[0])
 
     @property
     def attitude_std(self) -> Array:
         """Standard deviations of roll, pitch and heading, rad, shape (3,)."""
-        from polyins.evaluation.attitude import euler_variance
+        from polyins.attitude import euler_variance
 
         return np.asarray(np.sqrt(euler_variance(self.euler[None], self.phi_covariance[None])[0]))
 

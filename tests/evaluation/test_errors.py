@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_solutions import RADIUS_M, drive, moved, reference, solution
 
+from polyins.attitude import quaternions
 from polyins.errors import InputError
-from polyins.evaluation.attitude import quaternions
 from polyins.evaluation.errors import compare_to_reference
 
 metres = st.floats(-50.0, 50.0)

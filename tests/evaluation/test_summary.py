@@ -7,7 +7,7 @@ import pytest
 from synthetic_solutions import drifting, drive, innovations, moved, reference, solution
 
 import polyins
-from polyins.evaluation.attitude import quaternions
+from polyins.attitude import quaternions
 from polyins.evaluation.summary import comparison, plain, summarize
 
 KEYS = {

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polyins.evaluation.attitude import quaternions
+from polyins.attitude import quaternions
 from polyins.live import nmea
 from polyins.live.snapshot import Snapshot
 

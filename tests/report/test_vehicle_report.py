@@ -9,7 +9,7 @@ import pytest
 from plotted import plotted
 from synthetic_solutions import drifting, drive, no_innovations, recording, reference
 
-from polyins.evaluation.attitude import rotation_matrices
+from polyins.attitude import rotation_matrices
 from polyins.evaluation.summary import comparison, on_wheels, summarize
 from polyins.geodesy import displacement
 from polyins.recording import Recording

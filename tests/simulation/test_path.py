@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymap3d import ecef2ned, geodetic2ecef
 
-from polyins.evaluation.attitude import rotation_matrices
+from polyins.attitude import rotation_matrices
 from polyins.simulation import earth
 from polyins.simulation.path import LATERAL_LIMIT, SLOPE_LIMIT, TURN_RADIUS, drive, path, smooth_steps
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.attitude import angular_rate, euler_angles, rotation_matrices, wrap
 from polyins.errors import InputError
-from polyins.evaluation.attitude import angular_rate, euler_angles, rotation_matrices, wrap
 from polyins.geodesy import metres_per_unit
 from polyins.recording import Reference
 from polyins.rig import Vector

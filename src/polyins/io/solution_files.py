@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import __version__
+from polyins.attitude import euler_angles, euler_variance, quaternions
 from polyins.errors import InputError
-from polyins.evaluation.attitude import euler_angles, euler_variance, quaternions
 from polyins.evaluation.summary import plain
 from polyins.geodesy import displacement
 from polyins.io.arrow_arrays import texts_to_arrow, to_arrow, to_numpy

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluation.attitude import euler_angles, euler_variance
+from polyins.attitude import euler_angles, euler_variance
 from polyins.geodesy import displacement
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluation.attitude import rotation_matrices
+from polyins.attitude import rotation_matrices
 from polyins.evaluation.errors import Errors, compare_to_reference
 from polyins.evaluation.summary import Document, on_wheels
 from polyins.geodesy import metres_per_unit

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluation.attitude import euler_angles, euler_variance
+from polyins.attitude import euler_angles, euler_variance
 from polyins.evaluation.errors import Errors
 from polyins.evaluation.summary import plain
 from polyins.geodesy import metres_per_unit

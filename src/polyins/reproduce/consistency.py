@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from polyins import batch
 from polyins.alignment import rotation_matrix
-from polyins.evaluation.attitude import rotation_matrices
+from polyins.attitude import rotation_matrices
 from polyins.evaluation.consistency import nees, nees_bounds, share_inside
 from polyins.geodesy import metres_per_unit
 from polyins.kernels import share

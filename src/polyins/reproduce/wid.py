@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import batch, datasets
+from polyins.attitude import euler_angles, rotation_matrices, wrap
 from polyins.errors import InputError
-from polyins.evaluation.attitude import euler_angles, rotation_matrices, wrap
 from polyins.evaluation.drift import drift
 from polyins.evaluation.errors import Errors, rms
 from polyins.evaluation.summary import plain, summarize

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polyins.evaluation.attitude import euler_jacobian, quaternions, rotation_matrices, wrap
+from polyins.attitude import euler_jacobian, quaternions, rotation_matrices, wrap
 from polyins.rig import DEG
 from polyins.simulation import earth
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from polyins.evaluation.attitude import (
+from polyins.attitude import (
     angular_rate,
     euler_angles,
     euler_jacobian,
