@@ -57,14 +57,14 @@ def bounce(ground: Array, step: float, suspension: Suspension, gravity: float) -
     tyre = np.array([stiffness, drag, gravity / stiffness, gravity])
     motion, change = np.zeros((len(ground), 3)), np.zeros((len(ground), 3))
     motion[0] = arms @ ground[0] / (arms**2).sum(axis=1)
-    _bounce(np.ascontiguousarray(ground), step, arms, acting, tyre, motion, change)
+    _bounce(np.ascontiguousarray(ground), step, arms, acting, tyre, np.empty(30), motion, change)
     return motion, change
 
 
 @kernel
-def _bounce(ground: Array, step: float, arms: Array, acting: Array, tyre: Array, motion: Array, change: Array) -> None:
+def _bounce(ground: Array, step: float, arms: Array, acting: Array, tyre: Array, scratch: Array, motion: Array, change: Array) -> None:
     """Fill motion and change from their first row."""
-    slopes, place, speed = np.empty((4, 6)), np.empty(3), np.empty(3)
+    slopes, place, speed = scratch[:24].reshape(4, 6), scratch[24:27], scratch[27:30]
     for k in range(1, len(ground)):
         for stage in range(4):
             ahead = (0.0, 0.5, 0.5, 1.0)[stage]
