@@ -54,16 +54,13 @@ class Sweep:
 SWEEPS = {
     "roughness_mm": Sweep("test A", nonrigid.with_roughness, (1.2, 1.6, 2.0), 1.6, 20, "roughness of the lawn, mm rms"),
     "book_heights": Sweep("test B", nonrigid.with_books, (0.5, 0.75, 1.0), 1.0, 5, "thickness of the books, share"),
-    "length_mm": Sweep(
-        "test B", nonrigid.with_lengths, (150.0, 185.0, 200.0, 210.0, 260.0), 200.0, 5, "books, mm long"
-    ),
+    "length_mm": Sweep("test B", nonrigid.with_lengths, (150.0, 200.0, 260.0), 200.0, 5, "books, mm long"),
     "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 5, "thickness of the rulers, mm"),
 }
 
 WHEELS: dict[str, dict[str, Any]] = {
     "tyres only push": {"tyres_only_push": True},
     "round wheel": {"wheel_radius_m": 0.125},
-    "round wheel, tyres only push": {"tyres_only_push": True, "wheel_radius_m": 0.125},
 }
 """what else the road may say of wheels; 0.2 to 0.3 m across is usual for such robots"""
 WHEEL_SEEDS = 5
