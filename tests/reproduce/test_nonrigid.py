@@ -62,9 +62,10 @@ def test_figures_are_pooled_over_all_outages_of_all_seeds() -> None:
 
 
 def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    row = {"single": 6.0, "imu-fusion": 5.0, "nav-fusion": 2.5, "enav-fusion": 2.0}
+    errors = {"single": 6.0, "imu-fusion": 5.0, "nav-fusion": 2.5, "enav-fusion": 2.0}
+    runs = [{name: np.array([error]) for name, error in errors.items()}]
 
-    monkeypatch.setattr(a5, "table", lambda *_: row)
+    monkeypatch.setattr(a5, "run", lambda *_: runs)
     document = a5.reproduce(quick=True)
     assert set(document["paper"]) <= set(document["polyins"])
     assert document["polyins"]["test A"]["imu_fusion_over_nav_fusion"] == pytest.approx(2.0)
@@ -74,6 +75,8 @@ def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pyte
     assert document["paper"]["test B"]["ratio_to_rigid_single"]["imu-fusion"] == pytest.approx(1.16, abs=0.005)
     assert sorted(document["polyins"]["roughness_mm"]) == ["1.2", "1.6", "2"]
     assert document["polyins"]["book_heights"]["0.5"]["excess"] == pytest.approx(2.5)
+    assert document["polyins"]["length_mm"]["150"]["imu_fusion_over_single"] == pytest.approx(5.0 / 6.0)
+    assert set(document["polyins"]["wheels"]["test B"]) == {"as it is", *a5.WHEELS}
 
 
 def test_what_is_swept_is_all_that_changes() -> None:
@@ -84,6 +87,7 @@ def test_what_is_swept_is_all_that_changes() -> None:
     assert thin.road is not None
     assert [book.height_m for book in thin.road.books] == [0.5 * book.height_m for book in books.road.books]
     assert nonrigid.with_books(thin, 2.0) == books
+    assert nonrigid.with_lengths(nonrigid.with_lengths(books, 150.0), 200.0) == books
     stiff = nonrigid.with_thickness(lawn, 2.0)
     assert stiff.rulers is not None
     # of the ruler alone; the module's mass at its tip makes it more

@@ -23,7 +23,7 @@ def shuttle(duration=40.0):
     return Shuttle(speed_m_s=1.15, straight_m=8.0, turn_radius_m=1.0).path(duration, 3.0, (0.53, 1.99, 30.0), earth)
 
 
-def lawn(path, roughness_mm=2.0):
+def lawn(path, roughness_mm=3.0):
     road = Road(roughness_mm=roughness_mm, books=(Book(at_m=2.0, height_m=0.01, under="left"),))
     return shake(path, road.ground(path, (3.0,), np.random.default_rng(3)), road.suspension(), STEP)
 

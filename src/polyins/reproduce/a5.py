@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
 SEEDS = {"rigid": 10, "test A": 20, "test B": 20}
 QUICK_SEEDS = 1
-SWEPT = ("single", "imu-fusion", "nav-fusion")
+SWEPT = ("imu-fusion", "nav-fusion")
+"""one IMU errs much the same whatever is varied"""
 
 PAPER = {
     "rigid": {"single": 4.87},
@@ -52,9 +53,21 @@ class Sweep:
 
 SWEEPS = {
     "roughness_mm": Sweep("test A", nonrigid.with_roughness, (1.2, 1.6, 2.0), 1.6, 20, "roughness of the lawn, mm rms"),
-    "book_heights": Sweep("test B", nonrigid.with_books, (0.5, 0.75, 1.0), 1.0, 10, "thickness of the books, share"),
-    "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 10, "thickness of the rulers, mm"),
+    "book_heights": Sweep("test B", nonrigid.with_books, (0.5, 0.75, 1.0), 1.0, 5, "thickness of the books, share"),
+    "length_mm": Sweep("test B", nonrigid.with_lengths, (150.0, 200.0, 260.0), 200.0, 5, "books, mm long"),
+    "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 5, "thickness of the rulers, mm"),
 }
+
+WHEELS: dict[str, dict[str, Any]] = {
+    "tyres only push": {"tyres_only_push": True},
+    "round wheel": {"wheel_radius_m": 0.125},
+}
+"""what else the road may say of wheels; 0.2 to 0.3 m across is usual for such robots"""
+WHEEL_SEEDS = 5
+WHEEL_TESTS = ("test A", "test B")
+
+Runs = list[dict[str, Array]]
+"""by seed and method: the largest horizontal error in each outage, m; of `single` for every IMU"""
 
 Document = dict[str, Any]
 
@@ -62,54 +75,77 @@ Document = dict[str, Any]
 def reproduce(
     quick: bool = False, progress: Callable[[float], None] | None = None, out: Path | None = None
 ) -> Document:
-    """Run the rigid array, test A, test B and the sweeps over the lawn, the books and the rulers.
+    """Run the rigid array, test A, test B, the sweeps over the lawn, the books and the rulers, and other wheels.
 
     `quick` takes one seed, the first 330 s. `out` is the folder for the pictures.
     """
     seeds = dict.fromkeys(SEEDS, QUICK_SEEDS) if quick else SEEDS
     others = sum((QUICK_SEEDS if quick else sweep.seeds) * (len(sweep.values) - 1) for sweep in SWEEPS.values())
+    others += (QUICK_SEEDS if quick else WHEEL_SEEDS) * len(WHEELS) * len(WHEEL_TESTS)
     steps = Steps(progress, sum(seeds.values()) + others)
-    tables = {test: table(nonrigid.scenario_of(test, quick), count, steps) for test, count in seeds.items()}
-    sweeps = {name: run_sweep(sweep, tables[sweep.test], quick, steps) for name, sweep in SWEEPS.items()}
+    runs = {test: run(nonrigid.scenario_of(test, quick), count, steps) for test, count in seeds.items()}
+    tables = {test: row(found) for test, found in runs.items()}
+    sweeps = {name: run_sweep(sweep, runs[sweep.test], quick, steps) for name, sweep in SWEEPS.items()}
+    wheels = {test: run_wheels(test, runs[test], quick, steps) for test in WHEEL_TESTS}
     if out is not None:
         for name, sweep in SWEEPS.items():
             write_figure(sweep_figure(sweeps[name], sweep.title), out / f"a5-{name.partition('_')[0]}.html")
     return {
         "target": "a5",
         "paper": {name: {**row, "ratio_to_rigid_single": _ratios(PAPER["rigid"], row)} for name, row in PAPER.items()},
-        "polyins": {**{name: with_ratios(row, tables["rigid"]) for name, row in tables.items()}, **sweeps},
+        "polyins": {
+            **{name: with_ratios(row, tables["rigid"]) for name, row in tables.items()},
+            **sweeps,
+            "wheels": wheels,
+        },
         "settings": {
-            "seeds": {**seeds, **{name: QUICK_SEEDS if quick else sweep.seeds for name, sweep in SWEEPS.items()}},
+            "seeds": {
+                **seeds,
+                **{name: QUICK_SEEDS if quick else sweep.seeds for name, sweep in SWEEPS.items()},
+                "wheels": QUICK_SEEDS if quick else WHEEL_SEEDS,
+            },
             "outages": {name: len(nonrigid.scenario_of(name, quick).outage_intervals()) for name in seeds},
             "scenarios": {name: nonrigid.scenario_of(name, quick).model_dump(mode="json") for name in seeds},
         },
     }
 
 
-def run_sweep(sweep: Sweep, own: Mapping[str, float], quick: bool, steps: Steps) -> Document:
-    """Return the figures by value of what is varied; `own` are those of the test as it is."""
+def run_sweep(sweep: Sweep, own: Runs, quick: bool, steps: Steps) -> Document:
+    """Return the figures by value of what is varied; `own` are the runs of the test as it is."""
     scenario = nonrigid.scenario_of(sweep.test, quick)
     seeds = QUICK_SEEDS if quick else sweep.seeds
     return {
-        f"{value:g}": excess(own if value == sweep.own else table(sweep.change(scenario, value), seeds, steps, SWEPT))
+        f"{value:g}": excess(
+            own[:seeds] if value == sweep.own else run(sweep.change(scenario, value), seeds, steps, SWEPT), own[:seeds]
+        )
         for value in sweep.values
     }
 
 
-def table(
-    scenario: Scenario, seeds: int, steps: Steps, names: Sequence[str] = ("single", *METHODS)
-) -> dict[str, float]:
-    """Return the rms over outages and seeds, m, by method; of `single` over all IMUs."""
+def run_wheels(test: str, own: Runs, quick: bool, steps: Steps) -> Document:
+    """Return the figures of a test by kind of wheels; `own` are its runs as it is."""
+    scenario = nonrigid.scenario_of(test, quick)
+    seeds = QUICK_SEEDS if quick else WHEEL_SEEDS
+    others = {name: run(nonrigid.with_road(scenario, **kind), seeds, steps, SWEPT) for name, kind in WHEELS.items()}
+    return {name: excess(runs, own[:seeds]) for name, runs in {"as it is": own[:seeds], **others}.items()}
 
-    def run(number: int) -> dict[str, Array]:
+
+def run(scenario: Scenario, seeds: int, steps: Steps, names: Sequence[str] = ("single", *METHODS)) -> Runs:
+    """Return the errors in outages by seed."""
+
+    def one(number: int) -> dict[str, Array]:
         report = steps.next()
         recording = nonrigid.recording_of(scenario, number)
         found = {name: errors(recording, name) for name in names}
         report(1.0)
         return found
 
-    found = in_order(run, range(seeds))
-    return nonrigid.pooled({name: [each[name] for each in found] for name in names})
+    return in_order(one, range(seeds))
+
+
+def row(runs: Runs) -> dict[str, float]:
+    """Return the rms over outages and seeds, m, by method; of `single` over all IMUs."""
+    return nonrigid.pooled({name: [each[name] for each in runs] for name in runs[0]})
 
 
 def errors(recording: Recording, name: str) -> Array:
@@ -131,9 +167,18 @@ def with_ratios(row: dict[str, float], rigid: dict[str, float]) -> Document:
     }
 
 
-def excess(row: Mapping[str, float]) -> dict[str, float]:
-    """Return the methods of a sweep, m, and by how much more IMU-Fusion errs than Nav-Fusion."""
-    return {**{name: row[name] for name in SWEPT}, "excess": row["imu-fusion"] - row["nav-fusion"]}
+def excess(runs: Runs, own: Runs) -> dict[str, float]:
+    """Return the methods of a sweep, m, how much more IMU-Fusion errs than Nav-Fusion, and its ratios.
+
+    The single IMU is that of the test as it is, over the same seeds.
+    """
+    found = row(runs)
+    return {
+        **{name: found[name] for name in SWEPT},
+        "excess": found["imu-fusion"] - found["nav-fusion"],
+        "imu_fusion_over_single": found["imu-fusion"] / row(own)["single"],
+        "imu_fusion_over_nav_fusion": found["imu-fusion"] / found["nav-fusion"],
+    }
 
 
 def sweep_figure(sweep: Mapping[str, Mapping[str, float]], title: str) -> Figure:

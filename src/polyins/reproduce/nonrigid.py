@@ -35,17 +35,29 @@ def scenario_of(test: str, quick: bool) -> Scenario:
     return scenario.model_copy(update=update)
 
 
+def with_road(scenario: Scenario, **keys: Any) -> Scenario:
+    """Return the scenario with other keys of its road."""
+    assert scenario.road is not None
+    return scenario.model_copy(update={"road": scenario.road.model_copy(update=keys)})
+
+
 def with_roughness(scenario: Scenario, roughness_mm: float) -> Scenario:
     """Return the scenario on ground of another roughness, rms in mm."""
-    assert scenario.road is not None
-    return scenario.model_copy(update={"road": scenario.road.model_copy(update={"roughness_mm": roughness_mm})})
+    return with_road(scenario, roughness_mm=roughness_mm)
 
 
 def with_books(scenario: Scenario, share: float) -> Scenario:
     """Return the scenario with books of a share of their thickness."""
     assert scenario.road is not None
-    books = tuple(book.model_copy(update={"height_m": share * book.height_m}) for book in scenario.road.books)
-    return scenario.model_copy(update={"road": scenario.road.model_copy(update={"books": books})})
+    books = (book.model_copy(update={"height_m": share * book.height_m}) for book in scenario.road.books)
+    return with_road(scenario, books=tuple(books))
+
+
+def with_lengths(scenario: Scenario, length_mm: float) -> Scenario:
+    """Return the scenario with books of another length along the way, mm."""
+    assert scenario.road is not None
+    books = (book.model_copy(update={"length_m": length_mm * 1e-3}) for book in scenario.road.books)
+    return with_road(scenario, books=tuple(books))
 
 
 def with_thickness(scenario: Scenario, thickness_mm: float) -> Scenario:

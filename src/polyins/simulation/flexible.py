@@ -64,7 +64,11 @@ def flex(ruler: Ruler, shaking: Shaking, gravity: float) -> Array:
     sag = beam.gain * gravity / ruler.bending_rate**2
     turn, turning = shaking.motion[:, 1], shaking.change[:, 1]
     angle, rate = transmit(turn, shaking.step, ruler.tuning * beam.torsion_rate, ruler.damping)
-    return np.column_stack([place - moved + sag, angle - turn, speed - moving, rate - turning])
+    flexing = np.empty((len(moved), 4))
+    # without copies: a drive of ten minutes has 1.2 million rows
+    for column, (seen, clamp) in enumerate([(place, moved - sag), (angle, turn), (speed, moving), (rate, turning)]):
+        np.subtract(seen, clamp, out=flexing[:, column])
+    return flexing
 
 
 def foot_of(ruler: Ruler) -> Array:

@@ -161,8 +161,10 @@ class Road(Section):
     """Hz"""
     damping: Positive = 0.2
     """ratio, of the heave"""
-    wheel_radius_m: NotNegative = 0.125
-    """m"""
+    tyres_only_push: bool = False
+    """a wheel may leave the ground; otherwise tyres are springs that also pull"""
+    wheel_radius_m: NotNegative = 0.0
+    """of a disc that rolls over the ground's edges, m; 0: every wheel touches the ground below it"""
     envelope_m: NotNegative = 0.08
     """length of a tyre's footprint, over which it levels the ground, m"""
 
@@ -175,7 +177,9 @@ class Road(Section):
     def suspension(self) -> Suspension:
         """Return the robot's body on its wheels."""
         rates = 2.0 * np.pi * np.array([self.heave_hz, self.pitch_hz, self.roll_hz])
-        return Suspension(self.wheelbase_m, self.track_m, np.array(self.centre_m), rates, self.damping)
+        return Suspension(
+            self.wheelbase_m, self.track_m, np.array(self.centre_m), rates, self.damping, self.tyres_only_push
+        )
 
     def ground(self, path: Path, straight_begins: Sequence[float] | Array, rng: np.random.Generator) -> Ground:
         """Draw the ground along a path whose straights begin after the given ways, m."""

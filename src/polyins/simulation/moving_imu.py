@@ -66,7 +66,9 @@ def moving_increments(smooth: Array, ruler: Ruler, flexing: Array, shaking: Shak
     """
     increments = np.empty((len(smooth) - 3, 6))
     cubic, weights = interpolation(), simpson(shaking.step)
-    _integrate(smooth, shaking.motion, shaking.change, flexing, shape_of(ruler), cubic, weights, increments)
+    _integrate(
+        smooth, shaking.motion, shaking.change, flexing, shape_of(ruler), cubic, weights, np.empty(42), increments
+    )
     return increments[:, :3].copy(), increments[:, 3:].copy()
 
 
@@ -79,10 +81,11 @@ def _integrate(
     shape: Array,
     cubic: Array,
     weights: Array,
+    scratch: Array,
     increments: Array,
 ) -> None:
     """Write dtheta and dvel of each interval."""
-    rates_now, moved, seen, felt = np.empty(15), np.empty(18), np.empty(3), np.empty(6)
+    rates_now, moved, seen, felt = scratch[:15], scratch[15:33], scratch[33:36], scratch[36:42]
     for k in range(len(increments)):
         total = increments[k]
         for i in range(6):

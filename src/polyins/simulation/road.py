@@ -1,8 +1,8 @@
 """Rough ground under two wheel tracks, and books lying on it, as round and soft wheels meet them.
 
-A wheel is a bed of equal springs around a disc. The disc rolls over the ground: its lowest point is the greatest of the
-ground lifted by the disc's own curve. Over its footprint the springs level what is left, all alike: a small bump under
-any of them adds the same force.
+A tyre is a bed of equal springs, which level the ground over its footprint, all alike: a small bump under any of them
+adds the same force. With a radius, a disc first rolls over the ground: its lowest point is the greatest of the ground
+lifted by the disc's own curve.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Wheel:
     """What of a wheel decides how it meets the ground."""
 
     radius: float
-    """m"""
+    """of the disc, m; 0: what lies under the wheel counts as it is"""
     footprint: float
     """length over which its tyre levels the ground, m"""
 

@@ -1,14 +1,16 @@
-"""A robot's body on four tyres that push and never pull.
+"""A robot's body on four tyres: springs and dampers between the ground under each wheel and a corner of the body.
 
 A tyre under wheel i is a spring and a damper between the ground g_i and the body's corner
 h_i = z + x_i pitch - y_i roll (heights upwards, y to the right). At rest it is pressed in by d_0. With
 d_i = d_0 + g_i - h_i its force over the body's mass is
 
-    f_i = max(0, k d_i + c d_i')  on the ground, d_i > 0,    f_i = 0  above it.
+    f_i = k d_i + c d_i',
 
-The body obeys z'' = sum f_i - g, and likewise pitch and roll; k, c and the moments of inertia follow from the natural
-frequencies. While all wheels touch the ground this is linear: three oscillators whose feet are the plane that fits the
-ground under the wheels best. A wheel that the ground lets go falls with the body, no faster than gravity has it.
+and the body obeys z'' = sum f_i - g, and likewise pitch and roll; k, c and the moments of inertia follow from the
+natural frequencies. These are three oscillators whose feet are the plane that fits the ground under the wheels best.
+
+Tyres that only push have f_i = max(0, k d_i + c d_i') on the ground, d_i > 0, and none above it: a wheel that the
+ground lets go falls with the body, no faster than gravity has it.
 """
 
 from __future__ import annotations
@@ -37,6 +39,8 @@ class Suspension:
     """natural frequencies of heave, pitch, roll, rad/s, shape (3,)"""
     damping: float
     """ratio, of the heave; of the others it grows with their frequency, as the tyres are the same"""
+    only_push: bool = False
+    """a wheel may leave the ground"""
 
     def arms(self) -> Array:
         """Return by how much each mode lifts each corner, front left, right, rear left, right, shape (3, 4)."""
@@ -55,16 +59,27 @@ def bounce(ground: Array, step: float, suspension: Suspension, gravity: float) -
     acting = (suspension.rates**2 / (arms**2).sum(axis=1))[:, None] * arms / suspension.rates[0] ** 2
     stiffness, drag = suspension.rates[0] ** 2, 2.0 * suspension.damping * suspension.rates[0]
     tyre = np.array([stiffness, drag, gravity / stiffness, gravity])
+    least = 0.0 if suspension.only_push else -np.inf
     motion, change = np.zeros((len(ground), 3)), np.zeros((len(ground), 3))
     motion[0] = arms @ ground[0] / (arms**2).sum(axis=1)
-    _bounce(np.ascontiguousarray(ground), step, arms, acting, tyre, motion, change)
+    _bounce(np.ascontiguousarray(ground), step, arms, acting, tyre, least, np.empty(30), motion, change)
     return motion, change
 
 
 @kernel
-def _bounce(ground: Array, step: float, arms: Array, acting: Array, tyre: Array, motion: Array, change: Array) -> None:
+def _bounce(
+    ground: Array,
+    step: float,
+    arms: Array,
+    acting: Array,
+    tyre: Array,
+    least: float,
+    scratch: Array,
+    motion: Array,
+    change: Array,
+) -> None:
     """Fill motion and change from their first row."""
-    slopes, place, speed = np.empty((4, 6)), np.empty(3), np.empty(3)
+    slopes, place, speed = scratch[:24].reshape(4, 6), scratch[24:27], scratch[27:30]
     for k in range(1, len(ground)):
         for stage in range(4):
             ahead = (0.0, 0.5, 0.5, 1.0)[stage]
@@ -72,7 +87,7 @@ def _bounce(ground: Array, step: float, arms: Array, acting: Array, tyre: Array,
                 before = max(stage - 1, 0)
                 place[i] = motion[k - 1, i] + ahead * step * slopes[before, i] if stage else motion[k - 1, i]
                 speed[i] = change[k - 1, i] + ahead * step * slopes[before, 3 + i] if stage else change[k - 1, i]
-            _accelerate(ground[k - 1], ground[k], ahead, step, arms, acting, tyre, place, speed, slopes[stage])
+            _accelerate(ground[k - 1], ground[k], ahead, step, arms, acting, tyre, least, place, speed, slopes[stage])
         for i in range(3):
             motion[k, i] = motion[k - 1, i] + step * _mean(slopes, i)
             change[k, i] = change[k - 1, i] + step * _mean(slopes, 3 + i)
@@ -93,11 +108,15 @@ def _accelerate(
     arms: Array,
     acting: Array,
     tyre: Array,
+    least: float,
     place: Array,
     speed: Array,
     slope: Array,
 ) -> None:
-    """Write the derivatives of place and speed with the ground a part `ahead` of the step on."""
+    """Write the derivatives of place and speed with the ground a part `ahead` of the step on.
+
+    `least` is the smallest force of a tyre.
+    """
     for i in range(3):
         slope[i], slope[3 + i] = speed[i], 0.0
     slope[3] = -tyre[3]
@@ -107,7 +126,7 @@ def _accelerate(
         for i in range(3):
             pressed -= arms[i, wheel] * place[i]
             pressing -= arms[i, wheel] * speed[i]
-        if pressed > 0.0:
-            force = max(0.0, tyre[0] * pressed + tyre[1] * pressing)
+        if pressed > least:
+            force = max(least, tyre[0] * pressed + tyre[1] * pressing)
             for i in range(3):
                 slope[3 + i] += acting[i, wheel] * force
