@@ -341,8 +341,17 @@ class WheelFilter:
             total += point_displacement(self.imus[i], before[i], after[i], lenders, dt, self.point)
         return total / self.watched()
 
-    def update_speed(self, speed: float) -> None:
-        """speed: as the wheels' radii and gyros have it, the mean over the wheels and the window."""
+    def axle(self) -> Array:
+        """To the right along the rear axle, in n: what the navigators have of it, their mean."""
+        members = zip(self.imus, self.states, strict=True)
+        return np.mean([vehicle_matrix(*m, self.lender_state())[:, 1] for m in members], axis=0)
+
+    def update_speed(self, speed: float, radius: float) -> None:
+        """speed: as the wheels' radii and gyros have it, the mean over the wheels and the window.
+
+        Those gyros measure the earth's rate about the axle as well: `radius` is their wheels' mean.
+        """
+        speed += radius * self.axle() @ self.earth.earth_rate(self.states[0].position)
 
         def measure(i: int) -> Update:
             imu, state = self.imus[i], self.states[i]
@@ -482,9 +491,12 @@ class MeanSpeed:
         self.way = np.zeros(len(self.time))
         """of the wheels' mean over the interval that ends at each epoch"""
         dt = np.diff(self.time, prepend=2.0 * self.time[0] - self.time[1])
+        self.radius = 0.0
+        """the wheels' mean"""
         for j, bias in zip(wheels, spin_bias, strict=True):
             wheel = recording.rig.imus[j].wheel
             assert wheel is not None
+            self.radius += wheel.radius / len(wheels)
             self.way -= wheel.radius * (recording.imus[j].dtheta[:, 0] - bias * dt) / len(wheels)
 
     def at(self, k: int) -> float:
@@ -569,7 +581,7 @@ def run_reference(
             if options.standstill and filter_.stands():
                 filter_.update_standing(*standing_std)
             else:
-                filter_.update_speed(speed.at(k))
+                filter_.update_speed(speed.at(k), speed.radius)
             due["speed"] = time[k] + options.speed_interval
         if len(indices) > 1 and time[k] >= due["constraint"] - 0.5 * speed.interval:
             filter_.update_reference_point()

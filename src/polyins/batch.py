@@ -286,7 +286,7 @@ def build_state(
         g[share.WEIGHTS] = (last - first) / count
         _fill_share(g, members[first:last], start, recording.rig)
     state = _state(recording, blocks, groups, spans, start, inputs)
-    engine.begin(state, plan, inputs.increments[0], interval, _mean_to_origin(recording.rig))
+    engine.begin(state, plan, inputs.increments[0], interval, _mean_to_origin(recording.rig), None)
     return state
 
 
@@ -297,8 +297,10 @@ def _mean_to_origin(rig: Rig) -> Array:
 def _state(
     recording: Recording, blocks: Array, groups: Array, spans: list[tuple[int, int]], start: Start, inputs: Inputs
 ) -> State:
-    near = np.array([float(recording.geodetic), 0.0, 0.0, 1.0, recording.options.gravity])
-    engine.move_near(near, start.position[0])
+    latitude = start.position[0]
+    near = np.array(
+        [float(recording.geodetic), latitude, np.sin(latitude), np.cos(latitude), recording.options.gravity]
+    )
     return State(
         blocks=blocks,
         groups=groups,

@@ -13,7 +13,7 @@ from polyins.aiding import gnss, measurement, schedule, silence, vehicle_positio
 from polyins.aiding.rolling import Joint, Rolling
 from polyins.kernels import bank, dense, earth, fuse, joint, kalman, share, strapdown, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, entry, kernel
 
 UNUSED, ACCEPTED, REJECTED, REOPENED = 0, 1, 2, 3
 """What became of a fix."""
@@ -394,12 +394,13 @@ def load(blocks: Array, raw: Array) -> None:
                 w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
 
 
+@entry
 def begin(
-    state: State, plan: Plan, raw: Array, interval: float, origin: Array | None, rolling: Rolling | None = None
+    state: State, plan: Plan, raw: Array, interval: float, origin: Array | None, rolling: Rolling | None
 ) -> None:
     """Complete a state that holds positions, velocities, quaternions and errors.
 
-    The increments that end at the start are the previous ones of the first epoch. Runs once, so it is not compiled.
+    The increments that end at the start are the previous ones of the first epoch.
     """
     if origin is not None and plan.virtual:
         fuse.average_increments(raw, interval, origin, state.before, state.blocks)
@@ -419,9 +420,9 @@ def begin(
     for s in range(state.members.shape[0]):
         fuse.fuse_measurements(state.blocks, state.members[s, 0], state.members[s, 1], state.groups[s], interval)
     gather_idle_lanes(state.blocks, state.members)
-    if rolling is None:
+    if origin is not None:
         merge(state.blocks, state.groups, state.members, state.clock[1])
-    else:
+    if rolling is not None:
         measurement.update_derived(state.blocks, state.groups, state.members, rolling, state.clock[1])
 
 
@@ -461,7 +462,7 @@ def _log(state: State, outputs: Outputs, time: float) -> None:
                 outputs.log[row, 1, k, i] = math.sqrt(share.variance(g, share.NAV + k))
 
 
-@kernel
+@entry
 def gather_idle_lanes(blocks: Array, members: Array) -> None:
     """Put the lanes without an IMU where the last one before them is: they would fall for hours otherwise."""
     for s in range(members.shape[0]):
@@ -473,7 +474,7 @@ def gather_idle_lanes(blocks: Array, members: Array) -> None:
                     blocks[lane // LANES, field + lane % LANES] = blocks[last // LANES, field + last % LANES]
 
 
-@kernel
+@entry
 def run_epochs(
     state: State,
     plan: Plan,

@@ -212,7 +212,7 @@ def rolling(
         lenders=np.array([bodies[0] if bodies and s not in bodies else -1 for s in range(len(here))], dtype=np.int64),
         noise=np.array([options.body_speed_std if s in bodies else options.wheel_speed_std for s in range(len(here))])
         ** 2,
-        settings=_settings(options),
+        settings=_settings(options, _mean_radius(modules, recording.rig)),
         antenna=recording.rig.antenna,
         travel=travel(modules, recording.rig, aligned.increments, intervals, missing, start_bias),
         present=present(modules, missing if missing.any() else missing[:0]),
@@ -223,7 +223,7 @@ def rolling(
     )
 
 
-def _settings(options: RollingOptions) -> Array:
+def _settings(options: RollingOptions, radius: float) -> Array:
     settings = np.zeros(places.SETTINGS)
     settings[places.SPEED_INTERVAL] = options.speed_interval
     settings[places.SPEED_WINDOW] = options.speed_window
@@ -234,7 +234,13 @@ def _settings(options: RollingOptions) -> Array:
     settings[places.ZERO_VELOCITY_VARIANCE] = ZERO_VELOCITY_STD**2
     settings[places.ZERO_RATE_VARIANCE] = ZERO_RATE_STD**2
     settings[places.STILL_RATE] = STILL_RATE
+    settings[places.RADIUS] = radius
     return settings
+
+
+def _mean_radius(modules: Modules, rig: Rig) -> float:
+    wheels = [[rig.imus[i].wheel for i in module] for module in modules.speed]
+    return float(np.mean([np.mean([wheel.radius for wheel in module if wheel]) for module in wheels]))
 
 
 def present(modules: Modules, missing: NDArray[np.bool_]) -> NDArray[np.uint8]:

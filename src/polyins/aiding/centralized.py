@@ -7,11 +7,11 @@ from polyins.aiding.measurement import feed_back, measure, update_derived
 from polyins.aiding.rolling import KIND, POINT, Joint, Rolling
 from polyins.kernels import bank, joint, kalman
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import STATES, STRIDE
 
 
-@kernel
+@scalar_kernel
 def add_rows(s: int, sign: float, groups: Array, rolling: Rolling, m: Array, h: Array) -> None:
     """Add the design matrix of a share, and of the one that lends to it, to that of all states."""
     for a in range(3):
@@ -25,7 +25,7 @@ def add_rows(s: int, sign: float, groups: Array, rolling: Rolling, m: Array, h: 
                 h[a, lender * STATES + k] += sign * m[kalman.LENT + a * STRIDE + k]
 
 
-@kernel
+@scalar_kernel
 def update_all(
     measured: int, z: Array, blocks: Array, members: Array, rolling: Rolling, joined: Joint, m: Array
 ) -> None:
@@ -56,7 +56,7 @@ def update_all(
                 w[bank.CORRECTION + n * LANES + lane] += k[0, j] * z0 + k[1, j] * z1 + k[2, j] * z2
 
 
-@kernel
+@scalar_kernel
 def begin_update(blocks: Array, groups: Array, members: Array, joined: Joint) -> None:
     """Gather the joined covariance; nothing is corrected yet."""
     joint.gather(groups, members.shape[0], joined.whole)
@@ -65,7 +65,7 @@ def begin_update(blocks: Array, groups: Array, members: Array, joined: Joint) ->
         blocks[b, bank.CORRECTION : bank.CORRECTION + STATES * LANES] = 0.0
 
 
-@kernel
+@scalar_kernel
 def end_update(
     blocks: Array, groups: Array, members: Array, near: Array, rolling: Rolling, joined: Joint, dt: float
 ) -> None:
@@ -77,7 +77,7 @@ def end_update(
     update_derived(blocks, groups, members, rolling, dt)
 
 
-@kernel
+@scalar_kernel
 def aid_all(
     blocks: Array,
     groups: Array,
@@ -122,7 +122,7 @@ def aid_all(
     end_update(blocks, groups, members, near, rolling, joined, dt)
 
 
-@kernel
+@scalar_kernel
 def measures(s: int, rolling: Rolling) -> bool:
     """Whether neither the share is silent nor the one that lends roll and pitch to it."""
     lender = rolling.lenders[s]

@@ -6,11 +6,11 @@ from polyins.aiding.measurement import feed_back, measure, update_derived
 from polyins.aiding.rolling import Rolling
 from polyins.kernels import bank, kalman
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import STATES
 
 
-@kernel
+@scalar_kernel
 def correct_each(
     blocks: Array, groups: Array, members: Array, measurements: Array, near: Array, rolling: Rolling, dt: float
 ) -> None:
@@ -25,7 +25,7 @@ def correct_each(
     update_derived(blocks, groups, members, rolling, dt)
 
 
-@kernel
+@scalar_kernel
 def _member_correction(w: Array, lane: int, m: Array) -> None:
     z0, z1, z2 = w[bank.RESIDUAL + lane], w[bank.RESIDUAL + LANES + lane], w[bank.RESIDUAL + 2 * LANES + lane]
     for k in range(STATES):
@@ -33,7 +33,7 @@ def _member_correction(w: Array, lane: int, m: Array) -> None:
         w[bank.CORRECTION + k * LANES + lane] = m[r] * z0 + m[r + 1] * z1 + m[r + 2] * z2
 
 
-@kernel
+@scalar_kernel
 def aid_each(
     blocks: Array,
     groups: Array,

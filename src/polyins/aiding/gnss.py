@@ -9,11 +9,11 @@ import math
 
 from polyins.kernels import bank, kalman, share
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import STRIDE
 
 
-@kernel
+@scalar_kernel
 def position_design(g: Array, m: Array) -> None:
     """Write H = [I, 0, (C l) x, 0 ...], paper A (7)."""
     _clear(m)
@@ -23,7 +23,7 @@ def position_design(g: Array, m: Array) -> None:
     _skew(m, 6, n, e, d)
 
 
-@kernel
+@scalar_kernel
 def velocity_design(g: Array, m: Array, earth_rate_n: float, earth_rate_d: float) -> None:
     """Write the design matrix of v + (C w - w_ie) x (C l): gyro errors enter through w."""
     _clear(m)
@@ -51,7 +51,7 @@ def velocity_design(g: Array, m: Array, earth_rate_n: float, earth_rate_d: float
             m[kalman.H + a * STRIDE + 15 + k] = value * g[share.RATE + k]
 
 
-@kernel
+@scalar_kernel
 def position_residuals(
     blocks: Array, first: int, last: int, fix: Array, metres: Array, geodetic: bool, m: Array
 ) -> None:
@@ -74,7 +74,7 @@ def position_residuals(
         m[kalman.RESIDUAL + a] /= weights
 
 
-@kernel
+@scalar_kernel
 def velocity_residuals(blocks: Array, first: int, last: int, fix: Array, dt: float, m: Array) -> None:
     """Write predicted minus measured antenna velocity of each member, m/s, and their mean.
 
@@ -101,7 +101,7 @@ def velocity_residuals(blocks: Array, first: int, last: int, fix: Array, dt: flo
         m[kalman.RESIDUAL + a] /= weights
 
 
-@kernel
+@scalar_kernel
 def _keep_residual(w: Array, lane: int, rn: float, re: float, rd: float, m: Array) -> float:
     weight: float = w[bank.WEIGHT + lane]
     for a, value in enumerate((rn, re, rd)):
@@ -110,7 +110,7 @@ def _keep_residual(w: Array, lane: int, rn: float, re: float, rd: float, m: Arra
     return weight
 
 
-@kernel
+@scalar_kernel
 def residuals_to_corrections(blocks: Array, first: int, last: int, m: Array) -> None:
     """Turn each member's residual into its error state, dx = K z, paper A (11)."""
     for i in range(first, last):
@@ -124,7 +124,7 @@ def residuals_to_corrections(blocks: Array, first: int, last: int, m: Array) -> 
             w[bank.CORRECTION + k * LANES + lane] = m[r] * z0 + m[r + 1] * z1 + m[r + 2] * z2
 
 
-@kernel
+@scalar_kernel
 def _antenna(w: Array, lane: int) -> tuple[float, float, float]:
     """C l of one IMU, m north, east, down."""
     x = w[bank.TO_ANTENNA + lane]
@@ -138,7 +138,7 @@ def _antenna(w: Array, lane: int) -> tuple[float, float, float]:
     )
 
 
-@kernel
+@scalar_kernel
 def _rotate(g: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     c = share.MATRIX
     return (
@@ -148,18 +148,18 @@ def _rotate(g: Array, x: float, y: float, z: float) -> tuple[float, float, float
     )
 
 
-@kernel
+@scalar_kernel
 def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@kernel
+@scalar_kernel
 def _clear(m: Array) -> None:
     for k in range(kalman.ROWS * STRIDE):
         m[kalman.H + k] = 0.0
 
 
-@kernel
+@scalar_kernel
 def _skew(m: Array, column: int, x: float, y: float, z: float) -> None:
     h = kalman.H + column
     m[h + 1], m[h + 2] = -z, y

@@ -24,10 +24,10 @@ from polyins.aiding.rolling import (
 )
 from polyins.kernels import bank, earth, fuse, kalman, share, strapdown, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 
 
-@kernel
+@scalar_kernel
 def update_derived(blocks: Array, groups: Array, members: Array, rolling: Rolling, dt: float) -> None:
     """Bring everything that follows from the navigation states up to date."""
     for b in range(blocks.shape[0]):
@@ -37,7 +37,7 @@ def update_derived(blocks: Array, groups: Array, members: Array, rolling: Rollin
     vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
 
 
-@kernel
+@scalar_kernel
 def _residual(w: Array, lane: int, lent: vehicle.Matrix, rolling: Rolling, near: Array) -> vehicle.Three:
     given = rolling.given
     kind = given[KIND]
@@ -54,7 +54,7 @@ def _residual(w: Array, lane: int, lent: vehicle.Matrix, rolling: Rolling, near:
     return standstill.rate_residual(w, lane, given[G_DURATION])
 
 
-@kernel
+@scalar_kernel
 def _design(g: Array, w: Array, lane: int, rolling: Rolling, m: Array) -> None:
     given = rolling.given
     kind = given[KIND]
@@ -68,7 +68,7 @@ def _design(g: Array, w: Array, lane: int, rolling: Rolling, m: Array) -> None:
         standstill.rate_design(g, m)
 
 
-@kernel
+@scalar_kernel
 def measure(s: int, blocks: Array, groups: Array, members: Array, near: Array, rolling: Rolling, m: Array) -> None:
     """Write design matrix, variances and residuals of a share: each member's own, and their mean."""
     kind = rolling.given[KIND]
@@ -91,7 +91,7 @@ def measure(s: int, blocks: Array, groups: Array, members: Array, near: Array, r
             m[kalman.RESIDUAL + a] += z[a] / (last - first)
 
 
-@kernel
+@scalar_kernel
 def feed_back(s: int, blocks: Array, groups: Array, members: Array, near: Array) -> None:
     """Apply the correction of each member of a share to its state."""
     g = groups[s]

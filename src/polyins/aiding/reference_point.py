@@ -10,11 +10,11 @@ import math
 
 from polyins.kernels import bank, kalman, share, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import INERTIAL, STRIDE
 
 
-@kernel
+@scalar_kernel
 def design(g: Array, w: Array, lane: int, point: Array, m: Array) -> None:
     """Write the design matrix at the fused state of a share, and TURN, what a rotation of the vehicle does.
 
@@ -36,7 +36,7 @@ def design(g: Array, w: Array, lane: int, point: Array, m: Array) -> None:
                 m[kalman.H + a * STRIDE + INERTIAL + k] = -g[share.MATRIX + 3 * a + k]
 
 
-@kernel
+@scalar_kernel
 def residual(
     w: Array, lane: int, lent: vehicle.Matrix, point: Array, position: Array, metres: Array, geodetic: bool
 ) -> vehicle.Three:
@@ -54,13 +54,13 @@ def residual(
     )
 
 
-@kernel
+@scalar_kernel
 def _in_vehicle(w: Array, lane: int, v: vehicle.Matrix, point: Array) -> vehicle.Three:
     p = bank.IN_VEHICLE + lane
     return vehicle.rotated(v, w[p] - point[0], w[p + LANES] - point[1], w[p + 2 * LANES] - point[2])
 
 
-@kernel
+@scalar_kernel
 def _skew(m: Array, to: int, stride: int, x: float, y: float, z: float) -> None:
     m[to + 1], m[to + 2] = -z, y
     m[to + stride], m[to + stride + 2] = z, -x

@@ -12,7 +12,9 @@ SPEED, POINT, ZERO_VELOCITY, ZERO_RATE = 0.0, 1.0, 2.0, 3.0
 # places in `Rolling.settings`
 SPEED_INTERVAL, SPEED_WINDOW, POINT_INTERVAL, AT_END, STANDSTILL = range(5)
 POINT_VARIANCE, ZERO_VELOCITY_VARIANCE, ZERO_RATE_VARIANCE, STILL_RATE = range(5, 9)
-SETTINGS = 9
+RADIUS = 9
+"""m, mean of the wheels that give the speed"""
+SETTINGS = 10
 
 # places in `Rolling.memory`
 LAST_SPEED, LAST_POINT, OPENED, FILLED, TRAVEL, LATERAL, STILL = range(7)

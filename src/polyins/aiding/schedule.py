@@ -24,6 +24,7 @@ from polyins.aiding.rolling import (
     POINT,
     POINT_INTERVAL,
     POINT_VARIANCE,
+    RADIUS,
     SPEED,
     SPEED_INTERVAL,
     SPEED_WINDOW,
@@ -38,15 +39,15 @@ from polyins.aiding.rolling import (
     Joint,
     Rolling,
 )
-from polyins.kernels import bank, share, vehicle
+from polyins.kernels import bank, earth, share, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 
 STILL_SPEED = 0.01
 """m/s"""
 
 
-@kernel
+@scalar_kernel
 def _aid(
     kind: float,
     variance: float,
@@ -70,7 +71,7 @@ def _aid(
         aid_all(blocks, groups, members, measurements, near, rolling, joined, dt)
 
 
-@kernel
+@scalar_kernel
 def _is_at_rest(blocks: Array, members: Array, rolling: Rolling, duration: float) -> bool:
     """Whether no wheel has rolled and no IMU that measures has turned during the window."""
     limit = rolling.settings[STILL_RATE] * duration
@@ -84,7 +85,16 @@ def _is_at_rest(blocks: Array, members: Array, rolling: Rolling, duration: float
     return True
 
 
-@kernel
+@scalar_kernel
+def _earth_rate_about_axle(merged: Array, near: Array) -> float:
+    """Return what a gyro on a wheel measures beside the rate of the wheel over ground, rad/s."""
+    if near[0] == 0.0:
+        return 0.0
+    rate: float = earth.EARTH_RATE_RAD_S * (merged[share.VEHICLE + 1] * near[3] - merged[share.VEHICLE + 7] * near[2])
+    return rate
+
+
+@scalar_kernel
 def _end_window(
     now: float,
     blocks: Array,
@@ -100,7 +110,7 @@ def _end_window(
     memory, given, settings = rolling.memory, rolling.given, rolling.settings
     duration = now - memory[OPENED]
     given[G_DURATION], given[G_DT] = duration, dt
-    given[G_SPEED] = memory[TRAVEL] / duration
+    given[G_SPEED] = memory[TRAVEL] / duration + settings[RADIUS] * _earth_rate_about_axle(groups[-1], near)
     given[G_LATERAL] = memory[LATERAL]
     since = now - memory[LAST_SPEED]
     memory[LAST_SPEED] = now
@@ -116,7 +126,7 @@ def _end_window(
         _aid(SPEED, 0.0, blocks, groups, members, measurements, near, rolling, joined, dt)
 
 
-@kernel
+@scalar_kernel
 def fill_window(
     k: int, fraction: float, blocks: Array, groups: Array, members: Array, rolling: Rolling, dt: float
 ) -> None:
@@ -132,7 +142,7 @@ def fill_window(
             wheel_speed.fill_window(blocks[i // LANES], i % LANES, lent, memory[LATERAL], dt)
 
 
-@kernel
+@scalar_kernel
 def open_window(now: float, lateral: float, blocks: Array, groups: Array, members: Array, rolling: Rolling) -> None:
     """Begin to take a speed."""
     memory = rolling.memory
@@ -144,7 +154,7 @@ def open_window(now: float, lateral: float, blocks: Array, groups: Array, member
             wheel_speed.open_window(blocks[i // LANES], i % LANES, lent, lateral)
 
 
-@kernel
+@scalar_kernel
 def step(
     k: int,
     now: float,

@@ -10,7 +10,7 @@ import math
 from polyins.aiding.rolling import FILLED, Joint, Rolling
 from polyins.kernels import bank, earth, fuse, share, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import STATES, STRIDE
 
 REALIGNMENT = 0.5
@@ -20,7 +20,7 @@ RESEED_POSITION, RESEED_VELOCITY, RESEED_TILT, RESEED_HEADING = 0.1, 0.2, 0.1, 0
 """Standard deviations of a share that measures again: m, m/s, rad, rad."""
 
 
-@kernel
+@scalar_kernel
 def note_silence(k: int, now: float, rolling: Rolling) -> None:
     """Note which shares give no data in epoch k, which begins at `now`, before it is navigated."""
     if rolling.present.shape[0] > 0:
@@ -32,7 +32,7 @@ def note_silence(k: int, now: float, rolling: Rolling) -> None:
                     rolling.memory[FILLED] = -1.0
 
 
-@kernel
+@scalar_kernel
 def move_silent(
     k: int,
     now: float,
@@ -71,7 +71,7 @@ def move_silent(
             fuse.fuse_states(blocks, first, last, groups[s])
 
 
-@kernel
+@scalar_kernel
 def _place_on_vehicle(w: Array, lane: int, merged: Array, travel: float, dt: float) -> None:
     """Put an IMU where the vehicle has it, and turn a wheel about its axle as far as it rolled."""
     v = vehicle.matrix_at(merged, share.VEHICLE)
@@ -84,7 +84,7 @@ def _place_on_vehicle(w: Array, lane: int, merged: Array, travel: float, dt: flo
     _move_with_vehicle(w, lane, merged, v)
 
 
-@kernel
+@scalar_kernel
 def _move_with_vehicle(w: Array, lane: int, merged: Array, v: vehicle.Matrix) -> None:
     """Give an IMU the position and the velocity that the vehicle has there."""
     c = vehicle.lane_matrix(w, bank.MATRIX + lane)
@@ -98,7 +98,7 @@ def _move_with_vehicle(w: Array, lane: int, merged: Array, v: vehicle.Matrix) ->
         w[bank.VELOCITY + k * LANES + lane] = merged[share.VELOCITY + k]
 
 
-@kernel
+@scalar_kernel
 def _add_force(w: Array, lane: int, merged: Array, elapsed: float, dt: float) -> None:
     """Turn an IMU on a wheel with its own data, the axle kept, and add up the force that it feels, in n."""
     v = vehicle.matrix_at(merged, share.VEHICLE)
@@ -119,7 +119,7 @@ def _add_force(w: Array, lane: int, merged: Array, elapsed: float, dt: float) ->
             w[bank.TRAVELLED + k * LANES + lane] += w[bank.DVEL_N + k * LANES + lane] + felt[k] * dt
 
 
-@kernel
+@scalar_kernel
 def _align_angle(w: Array, lane: int, merged: Array, elapsed: float) -> None:
     """Turn an IMU on a wheel about the axle until the force that it felt is gravity and the vehicle's acceleration."""
     if w[bank.WHEEL + lane] == 0.0:
@@ -138,7 +138,7 @@ def _align_angle(w: Array, lane: int, merged: Array, elapsed: float) -> None:
     _move_with_vehicle(w, lane, merged, v)
 
 
-@kernel
+@scalar_kernel
 def _coast(groups: Array, silent: Array, near: Array, dt: float) -> None:
     """With every share silent the vehicle goes on as it went."""
     for s in range(silent.shape[0]):
@@ -151,7 +151,7 @@ def _coast(groups: Array, silent: Array, near: Array, dt: float) -> None:
         merged[share.POSITION + k] += merged[share.VELOCITY + k] * dt / metres[k]
 
 
-@kernel
+@scalar_kernel
 def _reseed(s: int, groups: Array, joined: Joint | None) -> None:
     """Begin anew with what the vehicle says of a share; what is known of its IMU's errors stays."""
     g = groups[s]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from polyins.kernels import bank, kalman, share, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import STRIDE
 
 
-@kernel
+@scalar_kernel
 def velocity_design(m: Array) -> None:
     """I on velocity."""
     _clear(m)
@@ -16,14 +16,14 @@ def velocity_design(m: Array) -> None:
         m[kalman.H + a * STRIDE + 3 + a] = 1.0
 
 
-@kernel
+@scalar_kernel
 def velocity_residual(w: Array, lane: int) -> vehicle.Three:
     """Velocity, m/s north, east, down."""
     v = bank.VELOCITY + lane
     return w[v], w[v + LANES], w[v + 2 * LANES]
 
 
-@kernel
+@scalar_kernel
 def rate_design(g: Array, m: Array) -> None:
     """I on gyro bias, the rate on gyro scale."""
     _clear(m)
@@ -32,7 +32,7 @@ def rate_design(g: Array, m: Array) -> None:
         m[kalman.H + a * STRIDE + 15 + a] = g[share.RATE + a]
 
 
-@kernel
+@scalar_kernel
 def rate_residual(w: Array, lane: int, duration: float) -> vehicle.Three:
     """Mean corrected rate over the window less the earth's, rad/s in the IMU's axes."""
     c = vehicle.lane_matrix(w, bank.MATRIX + lane)
@@ -41,7 +41,7 @@ def rate_residual(w: Array, lane: int, duration: float) -> vehicle.Three:
     return w[t] / duration - x, w[t + LANES] / duration - y, w[t + 2 * LANES] / duration - z
 
 
-@kernel
+@scalar_kernel
 def _clear(m: Array) -> None:
     for k in range(kalman.ROWS * STRIDE):
         m[kalman.H + k] = 0.0

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from polyins.kernels import bank, kalman, share, vehicle
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import INERTIAL, STRIDE
 
 
-@kernel
+@scalar_kernel
 def add_own(g: Array, w: Array, lane: int, m: Array) -> None:
     """Add TURN times the rotation of the vehicle by the IMU's own errors to the design matrix.
 
@@ -30,7 +30,7 @@ def add_own(g: Array, w: Array, lane: int, m: Array) -> None:
             _add_mount(g, m, kalman.H + a * STRIDE, m[t], m[t + 1], m[t + 2])
 
 
-@kernel
+@scalar_kernel
 def write_lent(groups: Array, s: int, lender: int, m: Array) -> None:
     """Write the design matrix in the states of the share that lends roll and pitch to share s.
 
@@ -56,7 +56,7 @@ def write_lent(groups: Array, s: int, lender: int, m: Array) -> None:
         _add_mount(groups[lender], m, h, m[h + 6], m[h + 7], 0.0)
 
 
-@kernel
+@scalar_kernel
 def _add_mount(g: Array, m: Array, row: int, n: float, e: float, d: float) -> None:
     """Add -(n, e, d) C in the columns of pitch and yaw of a mount."""
     c = share.MATRIX

@@ -8,10 +8,10 @@ from polyins.aiding.measurement import measure
 from polyins.aiding.rolling import FILLED, G_KNOWN, G_POINT, G_VARIANCE, KIND, LATERAL, POINT, Joint, Rolling
 from polyins.aiding.schedule import open_window
 from polyins.kernels import joint, kalman
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 
 
-@kernel
+@scalar_kernel
 def measure_position_each(
     fix: Array, blocks: Array, groups: Array, members: Array, measurements: Array, near: Array, rolling: Rolling
 ) -> float:
@@ -27,7 +27,7 @@ def measure_position_each(
     return total / max(measuring, 1)
 
 
-@kernel
+@scalar_kernel
 def measure_position_all(
     fix: Array,
     blocks: Array,
@@ -60,7 +60,7 @@ def measure_position_all(
     return kalman.normalized_innovation_squared(m)
 
 
-@kernel
+@scalar_kernel
 def measure_position(
     fix: Array,
     blocks: Array,
@@ -77,7 +77,7 @@ def measure_position(
     return measure_position_all(fix, blocks, groups, members, measurements, near, rolling, joined)
 
 
-@kernel
+@scalar_kernel
 def _prepare(fix: Array, rolling: Rolling) -> None:
     rolling.given[KIND] = POINT
     for a in range(3):
@@ -86,7 +86,7 @@ def _prepare(fix: Array, rolling: Rolling) -> None:
         rolling.given[G_POINT + a] = rolling.antenna[a]
 
 
-@kernel
+@scalar_kernel
 def correct_by_position(
     blocks: Array,
     groups: Array,

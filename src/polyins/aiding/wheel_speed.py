@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from polyins.kernels import bank, kalman, share, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 from polyins.kernels.share import INERTIAL, STRIDE
 
 
-@kernel
+@scalar_kernel
 def open_window(w: Array, lane: int, lent: vehicle.Matrix, lateral: float) -> None:
     """Begin to add up what the point travels."""
     for k in range(3):
@@ -21,7 +21,7 @@ def open_window(w: Array, lane: int, lent: vehicle.Matrix, lateral: float) -> No
     _remember(w, lane, vehicle.vehicle_matrix(w, lane, lent), _point(w, lane, lateral))
 
 
-@kernel
+@scalar_kernel
 def fill_window(w: Array, lane: int, lent: vehicle.Matrix, lateral: float, dt: float) -> None:
     """Add what the point travelled during the last epoch, in vehicle axes of the middle of the epoch."""
     v = vehicle.vehicle_matrix(w, lane, lent)
@@ -40,14 +40,14 @@ def fill_window(w: Array, lane: int, lent: vehicle.Matrix, lateral: float, dt: f
     _remember(w, lane, v, point)
 
 
-@kernel
+@scalar_kernel
 def _point(w: Array, lane: int, lateral: float) -> vehicle.Three:
     """C l to the point of the speed, m north, east, down."""
     x, y, z = vehicle.lever_to_speed(w, lane, lateral)
     return vehicle.rotated(vehicle.lane_matrix(w, bank.MATRIX + lane), x, y, z)
 
 
-@kernel
+@scalar_kernel
 def _remember(w: Array, lane: int, v: vehicle.Matrix, point: vehicle.Three) -> None:
     for k in range(3):
         w[bank.BEFORE_POINT + k * LANES + lane] = point[k]
@@ -56,7 +56,7 @@ def _remember(w: Array, lane: int, v: vehicle.Matrix, point: vehicle.Three) -> N
         w[bank.BEFORE_VEHICLE + k * LANES + lane] = v[k]
 
 
-@kernel
+@scalar_kernel
 def residual_of_window(w: Array, lane: int, speed: float, duration: float) -> vehicle.Three:
     """Mean velocity of the point over the window, less the measured one: forward, right, down, m/s."""
     measured = (1.0 + w[bank.MOUNTING + lane]) * speed
@@ -68,7 +68,7 @@ def residual_of_window(w: Array, lane: int, speed: float, duration: float) -> ve
     )
 
 
-@kernel
+@scalar_kernel
 def residual_at_end(
     w: Array, lane: int, lent: vehicle.Matrix, lateral: float, speed: float, dt: float
 ) -> vehicle.Three:
@@ -91,7 +91,7 @@ def residual_at_end(
     return x - (1.0 + w[bank.MOUNTING + lane]) * speed, y, z
 
 
-@kernel
+@scalar_kernel
 def design(g: Array, w: Array, lane: int, lateral: float, speed: float, m: Array) -> None:
     """Write the design matrix at the fused state of a share, and TURN, what a rotation of the vehicle does.
 
@@ -123,18 +123,18 @@ def design(g: Array, w: Array, lane: int, lateral: float, speed: float, m: Array
     m[kalman.H + INERTIAL] = speed
 
 
-@kernel
+@scalar_kernel
 def _unit(k: int) -> vehicle.Three:
     return 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
 
 
-@kernel
+@scalar_kernel
 def _column(m: Array, column: int, values: vehicle.Three) -> None:
     for a in range(3):
         m[kalman.H + a * STRIDE + column] = values[a]
 
 
-@kernel
+@scalar_kernel
 def _turn(m: Array, k: int, values: vehicle.Three) -> None:
     for a in range(3):
         m[kalman.TURN + 3 * a + k] = values[a]

@@ -5,7 +5,7 @@ A sample is taken as constant within its own interval, which is the same as inte
 
 from __future__ import annotations
 
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, entry, kernel
 
 
 @kernel
@@ -32,7 +32,7 @@ def resample_interval(
         left = right
 
 
-@kernel
+@entry
 def resample(stamps: Array, values: Array, before: float, time: Array, begin: float, out: Array) -> None:
     """Write into `out` (T, 6) what was measured in each interval that ends at `time` (T,); the first begins at `begin`.
 
@@ -50,7 +50,7 @@ def resample(stamps: Array, values: Array, before: float, time: Array, begin: fl
         begin = time[k]
 
 
-@kernel
+@entry
 def assemble(
     stamps: Array,
     values: Array,
@@ -84,7 +84,7 @@ def assemble(
             first[i] += 1
 
 
-@kernel
+@entry
 def covered_until(stamps: Array, first: Array, last: Array, before: Array, longest: Array, out: Array) -> None:
     """Write into `out` (N,) up to when the waiting samples follow each other by no more than `longest` (N,)."""
     for i in range(stamps.shape[0]):

@@ -10,14 +10,14 @@ import math
 
 from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, scalar_kernel
 
 Three = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 
-@kernel
+@scalar_kernel
 def turned_about_down(c: Matrix, x: float, y: float, n: float, e: float) -> Matrix:
     """Turn C_nv about the vertical until its vector with the horizontal parts (x, y) points along (n, e)."""
     scale = 1.0 / math.sqrt((n * n + e * e) * (x * x + y * y))
@@ -36,7 +36,7 @@ def turned_about_down(c: Matrix, x: float, y: float, n: float, e: float) -> Matr
     )
 
 
-@kernel
+@scalar_kernel
 def turned_to_axle(lent: Matrix, n: float, e: float) -> Matrix:
     """Turn C_nv about the vertical until its axle points horizontally along (n, e).
 
@@ -45,7 +45,7 @@ def turned_to_axle(lent: Matrix, n: float, e: float) -> Matrix:
     return turned_about_down(lent, lent[1], lent[4], n, e)
 
 
-@kernel
+@scalar_kernel
 def on_body(c: Matrix, pitch: float, yaw: float) -> Matrix:
     """C_nv = C_nb exp(m x)', m = (0, pitch, yaw) the small rotation that takes the IMU's axes to the vehicle's."""
     square = pitch * pitch + yaw * yaw
@@ -67,19 +67,19 @@ def on_body(c: Matrix, pitch: float, yaw: float) -> Matrix:
     )
 
 
-@kernel
+@scalar_kernel
 def matrix_at(g: Array, c: int) -> Matrix:
     """Return the matrix at an offset of a share."""
     return g[c], g[c + 1], g[c + 2], g[c + 3], g[c + 4], g[c + 5], g[c + 6], g[c + 7], g[c + 8]
 
 
-@kernel
+@scalar_kernel
 def put_matrix(g: Array, c: int, v: Matrix) -> None:
     """Write a matrix at an offset of a share."""
     g[c], g[c + 1], g[c + 2], g[c + 3], g[c + 4], g[c + 5], g[c + 6], g[c + 7], g[c + 8] = v
 
 
-@kernel
+@scalar_kernel
 def lane_matrix(w: Array, c: int) -> Matrix:
     """Return the matrix of one IMU at an offset of its block, its lane included."""
     return (
@@ -95,25 +95,25 @@ def lane_matrix(w: Array, c: int) -> Matrix:
     )
 
 
-@kernel
+@scalar_kernel
 def rotated(c: Matrix, x: float, y: float, z: float) -> Three:
     """C times a vector."""
     return c[0] * x + c[1] * y + c[2] * z, c[3] * x + c[4] * y + c[5] * z, c[6] * x + c[7] * y + c[8] * z
 
 
-@kernel
+@scalar_kernel
 def rotated_back(c: Matrix, n: float, e: float, d: float) -> Three:
     """C' times a vector."""
     return c[0] * n + c[3] * e + c[6] * d, c[1] * n + c[4] * e + c[7] * d, c[2] * n + c[5] * e + c[8] * d
 
 
-@kernel
+@scalar_kernel
 def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Three:
     """Return a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@kernel
+@scalar_kernel
 def vehicle_matrix(w: Array, lane: int, lent: Matrix) -> Matrix:
     """C_nv as it follows from the attitude of one IMU."""
     c = lane_matrix(w, bank.MATRIX + lane)
@@ -122,7 +122,7 @@ def vehicle_matrix(w: Array, lane: int, lent: Matrix) -> Matrix:
     return on_body(c, w[bank.MOUNTING + LANES + lane], w[bank.MOUNTING + 2 * LANES + lane])
 
 
-@kernel
+@scalar_kernel
 def lent_matrix(groups: Array, lender: int) -> Matrix:
     """C_nv of the share that lends roll and pitch; level without one."""
     if lender < 0:
@@ -130,7 +130,7 @@ def lent_matrix(groups: Array, lender: int) -> Matrix:
     return matrix_at(groups[lender], share.VEHICLE)
 
 
-@kernel
+@scalar_kernel
 def update_attitudes(blocks: Array, groups: Array, members: Array, lenders: Array) -> None:
     """Write C_nv of each share from its fused attitude; the shares that lend come first in time, not in place."""
     for lending in (True, False):
@@ -146,7 +146,7 @@ def update_attitudes(blocks: Array, groups: Array, members: Array, lenders: Arra
                 put_matrix(g, share.VEHICLE, v)
 
 
-@kernel
+@scalar_kernel
 def lever_to_wheel(w: Array, lane: int) -> Three:
     """From the IMU to the centre of its wheel, as estimated, m, in its axes; zero on the body."""
     if w[bank.WHEEL + lane] == 0.0:
@@ -158,7 +158,7 @@ def lever_to_wheel(w: Array, lane: int) -> Three:
     )
 
 
-@kernel
+@scalar_kernel
 def lever_to_speed(w: Array, lane: int, lateral: float) -> Three:
     """From the IMU to the point whose speed the wheels give, `lateral` m to the right in the rear axle, in its axes.
 
@@ -170,7 +170,7 @@ def lever_to_speed(w: Array, lane: int, lateral: float) -> Three:
     return x + lateral, y + w[bank.MOUNTING + LANES + lane], z + w[bank.MOUNTING + 2 * LANES + lane]
 
 
-@kernel
+@scalar_kernel
 def merge(blocks: Array, groups: Array, members: Array, lenders: Array, silent: Array) -> None:
     """Write the middle of the rear axle, its velocity and the vehicle's attitude into the last group.
 
@@ -237,7 +237,7 @@ def merge(blocks: Array, groups: Array, members: Array, lenders: Array, silent: 
         merged[share.QUATERNION + k] = q[k]
 
 
-@kernel
+@scalar_kernel
 def wheel_turned(w: Array, lane: int, v: Matrix, angle: float) -> Matrix:
     """Return C_nb of an IMU on a wheel whose axle is that of the vehicle, turned about it from where it was."""
     xn, xe, xd = v[1], v[4], v[7]
@@ -261,7 +261,7 @@ def wheel_turned(w: Array, lane: int, v: Matrix, angle: float) -> Matrix:
     )
 
 
-@kernel
+@scalar_kernel
 def quaternion(c: Matrix, near: Quaternion) -> Quaternion:
     """Return the quaternion of a rotation that lies on the side of the hypersphere where `near` is."""
     trace = c[0] + c[4] + c[8]
@@ -283,7 +283,7 @@ def quaternion(c: Matrix, near: Quaternion) -> Quaternion:
     return q
 
 
-@kernel
+@scalar_kernel
 def put_attitude(w: Array, lane: int, c: Matrix) -> None:
     """Give an IMU an attitude: matrix and quaternion, on the side of the hypersphere where it was."""
     for k in range(9):
