@@ -13,7 +13,7 @@ from polyins.aiding import gnss, measurement, schedule, silence, vehicle_positio
 from polyins.aiding.rolling import Joint, Rolling
 from polyins.kernels import bank, dense, earth, fuse, joint, kalman, share, strapdown, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.jit import Array, entry, kernel
+from polyins.kernels.jit import Array, entry, kernel, scalar_kernel
 
 UNUSED, ACCEPTED, REJECTED, REOPENED = 0, 1, 2, 3
 """What became of a fix."""
@@ -163,7 +163,7 @@ def propagate(
         vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
 
 
-@kernel
+@scalar_kernel
 def move_near(near: Array, latitude: float) -> None:
     """Make a latitude the one near which the earth is evaluated."""
     near[1] = latitude
@@ -171,7 +171,7 @@ def move_near(near: Array, latitude: float) -> None:
     near[3] = math.cos(latitude)
 
 
-@kernel
+@scalar_kernel
 def merge(blocks: Array, groups: Array, members: Array, dt: float) -> None:
     """Fuse the members of each share, and all IMUs of an array into the last row of the groups."""
     if members[members.shape[0] - 1, 1] > 1:
@@ -183,7 +183,7 @@ def merge(blocks: Array, groups: Array, members: Array, dt: float) -> None:
     _finish_merging(blocks, groups, members)
 
 
-@kernel
+@scalar_kernel
 def _finish_merging(blocks: Array, groups: Array, members: Array) -> None:
     """Write the fused states of an array, which has one share for all, or one for each IMU and then the mean of all."""
     if members[0, 1] - members[0, 0] == 1:
@@ -193,7 +193,7 @@ def _finish_merging(blocks: Array, groups: Array, members: Array) -> None:
         fuse.finish_states(groups[-1])
 
 
-@kernel
+@scalar_kernel
 def _measure_position(state: State, fix: Array) -> float:
     """Measure a GNSS position with every share; return the mean of their NIS."""
     geodetic = state.near[0] != 0.0
@@ -212,7 +212,7 @@ def _measure_position(state: State, fix: Array) -> float:
     return nis
 
 
-@kernel
+@scalar_kernel
 def aid_by_position(
     state: State,
     plan: Plan,
@@ -252,7 +252,7 @@ def aid_by_position(
     return status
 
 
-@kernel
+@scalar_kernel
 def _reopen_all(state: State, plan: Plan, nis: float, joined: Joint) -> None:
     """Let the joined covariance grow as `_reopen` lets that of a share; a jump is one for all shares."""
     growth = min(nis / 3.0, MOST_GROWTH)
@@ -269,7 +269,7 @@ def _reopen_all(state: State, plan: Plan, nis: float, joined: Joint) -> None:
         joint.gain(joined.h, m[kalman.R : kalman.R + 3], joined.whole, joined.hp, joined.gain, m)
 
 
-@kernel
+@scalar_kernel
 def aid_by_velocity(state: State, plan: Plan, fix: Array) -> bool:
     """Update every share by a GNSS velocity; return whether the gate let it pass."""
     nis = 0.0
@@ -298,7 +298,7 @@ def _has_measured(s: int, rolling: Rolling | None, joined: Joint | None) -> bool
     return True
 
 
-@kernel
+@scalar_kernel
 def _passes_gate(state: State, plan: Plan, nis: float, rolling: Rolling | None, joined: Joint | None) -> bool:
     if nis <= plan.gate_limit:
         return True
@@ -310,7 +310,7 @@ def _passes_gate(state: State, plan: Plan, nis: float, rolling: Rolling | None, 
     return cautious <= plan.gate_limit * measured
 
 
-@kernel
+@scalar_kernel
 def _record(state: State, nis: float, innovation: Array, rolling: Rolling | None, joined: Joint | None) -> None:
     innovation[:] = 0.0
     measured = 0
@@ -325,7 +325,7 @@ def _record(state: State, nis: float, innovation: Array, rolling: Rolling | None
     innovation[6] = nis
 
 
-@kernel
+@scalar_kernel
 def _reopen(state: State, plan: Plan, nis: float, rolling: Rolling | None) -> None:
     """Let the covariance grow until the fix is believable.
 
@@ -347,7 +347,7 @@ def _reopen(state: State, plan: Plan, nis: float, rolling: Rolling | None) -> No
             kalman.gain(g, m)
 
 
-@kernel
+@scalar_kernel
 def _correct(state: State) -> None:
     for s in range(state.members.shape[0]):
         g, m = state.groups[s], state.measurements[s]
@@ -362,7 +362,7 @@ def _correct(state: State) -> None:
     merge(state.blocks, state.groups, state.members, state.clock[1])
 
 
-@kernel
+@scalar_kernel
 def aid(
     state: State,
     plan: Plan,
@@ -438,7 +438,7 @@ def write(groups: Array, members: Array, states: Array, variances: Array, k: int
         _add_variances(groups[s], 1.0 / members.shape[0], variance)
 
 
-@kernel
+@scalar_kernel
 def _add_variances(g: Array, weight: float, variance: Array) -> None:
     for i in range(6):
         variance[i] += weight * g[share.P + i * (share.STRIDE + 1)]
@@ -449,7 +449,7 @@ def _add_variances(g: Array, weight: float, variance: Array) -> None:
             n += 1
 
 
-@kernel
+@scalar_kernel
 def _log(state: State, outputs: Outputs, time: float) -> None:
     row = state.counters[2]
     state.counters[2] += 1
@@ -510,28 +510,26 @@ def run_epochs(
             load(blocks, increments[k])
         if origin is not None and virtual:
             fuse.average_increments(increments[k], interval, origin, state.before, blocks)
-        while next_fix < end - snap:
-            if next_fix > now + snap:
-                dt = next_fix - now
-                propagate(
-                    blocks, groups, members, near, clock, shared, dt / interval, dt, work, origin, rolling, joined
-                )
-                now = next_fix
-            if fixes is not None:
-                aid(state, plan, fixes, outputs, inputs.velocities, origin, rolling, joined)
-            next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
-        fraction = (end - now) / interval
-        propagate(blocks, groups, members, near, clock, shared, fraction, end - now, work, origin, rolling, joined)
-        if rolling is not None:
-            measurements = state.measurements
-            schedule.fill_window(k, fraction, blocks, groups, members, rolling, end - now)
-            if rolling.present.shape[0] > 0:
-                silence.move_silent(k, end, blocks, groups, members, near, rolling, joined, interval)
-            schedule.step(k, end, blocks, groups, members, measurements, near, rolling, joined, end - now, interval)
-        while next_fix <= end + snap:
-            if fixes is not None:
-                aid(state, plan, fixes, outputs, inputs.velocities, origin, rolling, joined)
-            next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
+        arrived = False
+        while not arrived or next_fix <= end + snap:
+            if not arrived:
+                arrived = next_fix >= end - snap
+                until = end if arrived else next_fix
+                dt = until - now
+                fraction = dt / interval
+                if arrived or until > now + snap:
+                    propagate(blocks, groups, members, near, clock, shared, fraction, dt, work, origin, rolling, joined)
+                    now = until
+                if arrived and rolling is not None:
+                    measurements = state.measurements
+                    schedule.fill_window(k, fraction, blocks, groups, members, rolling, dt)
+                    if rolling.present.shape[0] > 0:
+                        silence.move_silent(k, end, blocks, groups, members, near, rolling, joined, interval)
+                    schedule.step(k, end, blocks, groups, members, measurements, near, rolling, joined, dt, interval)
+            if next_fix <= end + snap:
+                if fixes is not None:
+                    aid(state, plan, fixes, outputs, inputs.velocities, origin, rolling, joined)
+                next_fix = fix_time[counters[0]] if counters[0] < len(fix_time) else math.inf
         write(groups, members, states, variances, k)
         if (k - 1) % plan.log_every == 0:
             _log(state, outputs, end)

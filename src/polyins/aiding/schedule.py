@@ -116,14 +116,13 @@ def _end_window(
     memory[LAST_SPEED] = now
     still = settings[STANDSTILL] != 0.0 and _is_at_rest(blocks, members, rolling, duration)
     memory[STILL] += since if still else 0.0
+    # the window's rates were corrected by the errors as they still are: they come before the velocity
+    kind, variance = (ZERO_RATE, settings[ZERO_RATE_VARIANCE]) if still else (SPEED, 0.0)
+    if still or math.isfinite(given[G_SPEED]):
+        _aid(kind, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
     if still:
-        # the window's rates were corrected by the errors as they still are
-        variance = settings[ZERO_RATE_VARIANCE]
-        _aid(ZERO_RATE, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
         variance = settings[ZERO_VELOCITY_VARIANCE]
         _aid(ZERO_VELOCITY, variance, blocks, groups, members, measurements, near, rolling, joined, dt)
-    elif math.isfinite(given[G_SPEED]):
-        _aid(SPEED, 0.0, blocks, groups, members, measurements, near, rolling, joined, dt)
 
 
 @scalar_kernel

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from polyins.kernels import earth
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, kernel, scalar_kernel
 from polyins.kernels.layout import Layout
 
 STATES = 24
@@ -137,7 +137,7 @@ def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: floa
     _skew(g, _P, _P, -(wn + tn) * dt, -te * dt, -(wd + td) * dt)
 
 
-@kernel
+@scalar_kernel
 def _skew(g: Array, row: int, column: int, x: float, y: float, z: float) -> None:
     """Write the block (x, y, z) x of F."""
     c0 = F + column * HALF + row
@@ -171,7 +171,7 @@ def _sensor_terms(g: Array, dt: float) -> None:
             _put_half_noise(g, 3 + i, 3 + j, 2, 0.5 * dt * q_p)
 
 
-@kernel
+@scalar_kernel
 def _put_half_noise(g: Array, i: int, j: int, offset: int, q: float) -> None:
     """Write an element of the symmetric noise; columns are counted from `offset` before that of the first row."""
     g[HALF_Q + i * SENSORS + offset + j] = q
@@ -200,18 +200,18 @@ def error_model(g: Array, dt: float, near: Array) -> None:
 Three = tuple[float, float, float]
 
 
-@kernel
+@scalar_kernel
 def _factors(g: Array, f: int) -> Three:
     """F dt in three columns of one row, from the place of the first on."""
     return g[f], g[f + HALF], g[f + 2 * HALF]
 
 
-@kernel
+@scalar_kernel
 def _column(g: Array, x: int, stride: int) -> Three:
     return g[x], g[x + stride], g[x + 2 * stride]
 
 
-@kernel
+@scalar_kernel
 def _dot(a: Three, b: Three) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -219,13 +219,13 @@ def _dot(a: Three, b: Three) -> float:
 Row = tuple[float, float, Three, float, float]
 
 
-@kernel
+@scalar_kernel
 def _row(g: Array, i: int, k: int, m: int) -> Row:
     """Row i of F dt among the navigation states: no error depends on longitude, phi enters as a vector product."""
     return g[F + i], g[F + 2 * HALF + i], _factors(g, F + _V * HALF + i), g[F + k * HALF + i], g[F + m * HALF + i]
 
 
-@kernel
+@scalar_kernel
 def _times(f: Row, r: Three, v: Three, p1: float, p2: float) -> float:
     return (f[0] * r[0] + f[1] * r[2]) + _dot(f[2], v) + (f[3] * p1 + f[4] * p2)
 
@@ -310,13 +310,13 @@ def _scale(g: Array, dt: float) -> None:
         g[RATIO + k] = g[RATE + k] * g[SCALE + 6 + k]
 
 
-@kernel
+@scalar_kernel
 def _felt(s: Three, b: Three, ratio: Three, h: Three) -> Three:
     """Errors of a measured vector that biases and scales make."""
     return s[0] * b[0] + ratio[0] * h[0], s[1] * b[1] + ratio[1] * h[1], s[2] * b[2] + ratio[2] * h[2]
 
 
-@kernel
+@scalar_kernel
 def _put_c(g: Array, row: int, j: int, own: float) -> None:
     """Element of C <- A C + G B and of W = A C + G B / 2."""
     t = g[T + row * STRIDE + SENSORS + j]
@@ -348,7 +348,7 @@ def _through_sensors(g: Array) -> None:
         _put_c(g, 8, j, _dot(f8, rate))
 
 
-@kernel
+@scalar_kernel
 def _put_u(g: Array, i: int, j: int, scale: float, ratio: float) -> None:
     w = W + i * HALF + NAV - SENSORS + j
     g[U + i * SENSORS + j] = g[w] * scale + g[w + 6] * ratio
@@ -407,7 +407,7 @@ def _back_to_navigation(g: Array) -> None:
             _put_n(g, i, j, n + g[HALF_Q + (i - 3) * SENSORS + j - 1])
 
 
-@kernel
+@scalar_kernel
 def _put_n(g: Array, i: int, j: int, n: float) -> None:
     g[P + i * STRIDE + j] = n
     g[P + j * STRIDE + i] = n
@@ -453,7 +453,7 @@ def mirror(g: Array) -> None:
             g[P + k * STRIDE + i] = g[P + i * STRIDE + k]
 
 
-@kernel
+@scalar_kernel
 def scale_of(g: Array, state: int) -> float:
     """Return what P takes for one unit of a state: 1 but for IMU errors."""
     if NAV <= state < INERTIAL:
@@ -462,7 +462,7 @@ def scale_of(g: Array, state: int) -> float:
     return 1.0
 
 
-@kernel
+@scalar_kernel
 def owed(g: Array, state: int) -> float:
     """Return the noise that is yet to be added to the variance of a state."""
     if NAV <= state < INERTIAL:
@@ -471,7 +471,7 @@ def owed(g: Array, state: int) -> float:
     return 0.0
 
 
-@kernel
+@scalar_kernel
 def variance(g: Array, state: int) -> float:
     """Return the variance of a state."""
     scale = scale_of(g, state)
