@@ -395,9 +395,7 @@ def load(blocks: Array, raw: Array) -> None:
 
 
 @entry
-def begin(
-    state: State, plan: Plan, raw: Array, interval: float, origin: Array | None, rolling: Rolling | None
-) -> None:
+def begin(state: State, plan: Plan, raw: Array, interval: float, origin: Array | None, rolling: Rolling | None) -> None:
     """Complete a state that holds positions, velocities, quaternions and errors.
 
     The increments that end at the start are the previous ones of the first epoch.

@@ -72,11 +72,11 @@ def _compiled(function: F, **options: Any) -> F:
         NUMBA.CACHE_DIR = before
 
 
-class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
+class _PartLibrary(JITCodeLibrary):
     """Code that waits to be linked into that of an entry; there is no machine code of it."""
 
     def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
+        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
         self._finalized = True
 
     @property
@@ -94,23 +94,27 @@ class _ScalarPartLibrary(_PartLibrary):
         pass
 
 
-class _PartCompiler(Compiler):  # type: ignore[misc]
+class _PartCompiler(Compiler):
     library = _PartLibrary
 
     def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
-        own = self.library(target_context.codegen(), "part")
-        super().__init__(typing_context, target_context, own, *rest)
+        own = self.library(target_context.codegen(), "part")  # type: ignore[no-untyped-call]
+        super().__init__(typing_context, target_context, own, *rest)  # type: ignore[no-untyped-call]
 
 
 class _ScalarPartCompiler(_PartCompiler):
     library = _ScalarPartLibrary
 
 
-class _ScalarPartType(numba.types.Dispatcher):  # type: ignore[misc]
+class _ScalarPartType(numba.types.Dispatcher):
     """Numbers that are known beforehand, such as offsets, do not make a variant each."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        return super().get_call_type(context, [numba.types.unliteral(arg) for arg in args], kws)
+        unknown = tuple(numba.types.unliteral(arg) for arg in args)  # type: ignore[no-untyped-call]
+        return super().get_call_type(context, unknown, kws)
+
+
+numba.extending.register_model(_ScalarPartType)(numba.core.datamodel.models.OpaqueModel)
 
 
 class _Part:
@@ -149,7 +153,7 @@ def entry(function: F) -> F:
 
 
 def kernel(function: F) -> F:
-    """Make a function of arrays and numbers a part of entries, optimised by itself first, so that its loops vectorize."""
+    """Make a function of arrays and numbers a part of entries, optimised by itself first: so its loops vectorize."""
     return _part(function, _nrt=False)
 
 
