@@ -12,8 +12,9 @@ from polyins.geodesy import metres_per_unit
 from polyins.methods import find_method
 from polyins.modules import choose
 from polyins.recording import Reference
-from polyins.reproduce import b7, robot_experiments
+from polyins.reproduce import b6, b7, robot_experiments
 from polyins.reproduce.robot import CONFIGURATIONS, FEW, Score, as_in_the_paper, at_the_reference, by_seed, score, table
+from polyins.reproduce.sites import site
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario
 from polyins.simulation.vehicles import ROBOT
@@ -149,3 +150,11 @@ def test_a_plane_takes_the_place_of_the_earth(short):
     np.testing.assert_allclose(np.diff(flat.reference.position, axis=0)[:, :2], step[:, :2], atol=2e-5)
     assert flat.options.gravity == pytest.approx(9.7937, abs=2e-4)
     assert all(old is new for old, new in zip(short.imus, flat.imus, strict=True))
+
+
+def test_without_errors_the_robot_is_within_5_mm_on_the_turning_earth(monkeypatch):
+    # 6 mm where the earth's rate about the axle is taken for rolling
+    monkeypatch.setattr(b6, "PREDICTIONS", {"window": b6.PREDICTIONS["window"]})
+    monkeypatch.setattr(b6, "ONE_SAMPLE_S", b6.WINDOW)
+    (worst,) = b6.error_free_run(site(ROBOT, quick=False), "turning").values()
+    assert worst < 0.005
