@@ -135,13 +135,19 @@ def propagate(
             if b == 0:
                 fuse.begin_means(w, groups[-1])
             fuse.add_to_means(w, groups[-1])
+    if origin is not None and members.shape[0] > 1:
+        share.earth_terms(groups[-1], dt, near)
     for s in range(members.shape[0]):
         g = groups[s]
         if origin is not None and members[s, 1] - members[s, 0] > 1:
             fuse.finish_measurements(g, dt)
         else:
             fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
-        share.error_model(g, dt, near)
+        if origin is not None and members.shape[0] > 1:
+            share.copy_earth_terms(groups[-1], g)
+            share.sensor_terms(g, dt)
+        else:
+            share.error_model(g, dt, near)
         if work is None:
             share.predict(g, dt)
         elif joined is None:
@@ -387,11 +393,12 @@ def aid(
 @kernel
 def load(blocks: Array, raw: Array) -> None:
     """Put the measured increments of one epoch, (6, N), into the lanes."""
-    for b in range(blocks.shape[0]):
-        w = blocks[b]
-        for k in range(6):
-            for i in range(min(LANES, raw.shape[1] - b * LANES)):
-                w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
+    count = raw.shape[1]
+    for k in range(6):  # row by row: memory is fetched ahead only where it is read in order
+        for b in range(count // LANES):
+            bank.put_eight(blocks[b], bank.RAW_DTHETA + k * LANES, raw[k], b * LANES)
+        for i in range(count // LANES * LANES, count):
+            blocks[i // LANES, bank.RAW_DTHETA + k * LANES + i % LANES] = raw[k, i]
 
 
 def begin(

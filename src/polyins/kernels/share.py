@@ -29,29 +29,8 @@ _layout = Layout()
 _take = _layout.take
 
 
+# first what loops read and write in vectors of eight, in whole ones
 P = _take(STATES * STRIDE)
-# the fused state of the members, and the mean of their corrected increments as rates
-POSITION = _take(3)
-VELOCITY = _take(3)
-QUATERNION = _take(4)
-MATRIX = _take(9)
-RATE = _take(3)  # rad/s
-FORCE = _take(3)  # m/s^2
-VEHICLE = _take(9)  # C_nv of a vehicle with wheels
-WEIGHTS = _take(1)  # sum of the members' weights
-BASES = _take(16)  # work of the means, see `fuse`
-LANE_SUMS = _take(16 * 8)
-METRIC = _take(3)  # metres per unit of each coordinate at the last fix
-ANTENNA = _take(3)  # from the point of the fused state, in array axes, m
-# noise of one member
-GYRO_PSD = _take(3)  # angle random walk squared, rad^2/s
-ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
-ERROR_PSD = _take(16)  # twelve, 2 sigma^2 / tau of each Gauss-Markov process
-DECAY = _take(16)  # twelve, 1 / tau
-LOST = _take(16)  # the IMU errors that P speaks of are those of the filter divided by 1 less this
-OWED = _take(1)  # seconds for which half of their noise is yet to be added
-SINCE = _take(1)  # seconds since P was completed
-FASTEST = _take(1)  # the largest 1 / tau
 # error model times dt: row k holds what state k does to position, velocity and phi, that is F' without its zero rows
 F = _take(INERTIAL * HALF)
 HALF_Q = _take(6 * SENSORS)  # by rows of velocity and phi, columns from the second on
@@ -64,6 +43,28 @@ RATIO = _take(SENSORS)  # what a scale does for each unit of what the bias besid
 U = _take(NAV * SENSORS)
 S = _take(NAV * SENSORS)
 Z = _take(NAV * SENSORS)
+ERROR_PSD = _take(16)  # twelve, 2 sigma^2 / tau of each Gauss-Markov process
+DECAY = _take(16)  # twelve, 1 / tau
+LOST = _take(16)  # the IMU errors that P speaks of are those of the filter divided by 1 less this
+BASES = _take(16)  # work of the means, see `fuse`
+LANE_SUMS = _take(16 * 8)
+# the fused state of the members, and the mean of their corrected increments as rates
+POSITION = _take(3)
+VELOCITY = _take(3)
+QUATERNION = _take(4)
+MATRIX = _take(9)
+RATE = _take(3)  # rad/s
+FORCE = _take(3)  # m/s^2
+VEHICLE = _take(9)  # C_nv of a vehicle with wheels
+WEIGHTS = _take(1)  # sum of the members' weights
+METRIC = _take(3)  # metres per unit of each coordinate at the last fix
+ANTENNA = _take(3)  # from the point of the fused state, in array axes, m
+# noise of one member
+GYRO_PSD = _take(3)  # angle random walk squared, rad^2/s
+ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
+OWED = _take(1)  # seconds for which half of their noise is yet to be added
+SINCE = _take(1)  # seconds since P was completed
+FASTEST = _take(1)  # the largest 1 / tau
 
 SIZE = _layout.size
 
@@ -75,11 +76,27 @@ BY_N, BY_E, BY_D, BY_VN, BY_VE, BY_VD = (F + k * HALF for k in range(6))
 
 
 @kernel
-def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: float) -> None:
-    """Write the terms of F dt that come from earth rate, transport rate and gravity.
+def earth_terms(g: Array, dt: float, near: Array) -> None:
+    """Write the terms of F dt that only the fused state tells, that of the start of the interval.
 
-    Complete phi-angle model in n with position errors in metres; see docs/theory.
+    Complete phi-angle model in n with position errors in metres; see docs/theory. `near` as for `earth.evaluate`.
     """
+    for i in range(3):
+        g[F + (_V + i) * HALF + i] = dt
+    if near[0] != 0.0:
+        _curved_earth_terms(g, dt, near[1], near[2], near[3])
+
+
+@kernel
+def copy_earth_terms(source: Array, g: Array) -> None:
+    """Take the terms of another fused state, metres apart; for what that leaves out see docs/theory."""
+    for n in range(NAV * HALF):
+        g[F + n] = source[F + n]
+
+
+@kernel
+def _curved_earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: float) -> None:
+    """Write the terms that come from earth rate, transport rate and gravity."""
     d = g[POSITION] - latitude
     sin_d = d * (1.0 - d * d / 6.0)
     cos_d = 1.0 - d * d * (0.5 - d * d / 24.0)
@@ -148,8 +165,8 @@ def _skew(g: Array, row: int, column: int, x: float, y: float, z: float) -> None
 
 
 @kernel
-def _sensor_terms(g: Array, dt: float) -> None:
-    """Write the terms of F dt that come from attitude and biases, and half of the noise over dt."""
+def sensor_terms(g: Array, dt: float) -> None:
+    """Write the terms of F dt that come from attitude and biases, but for those of scales, and Q dt / 2."""
     fx, fy, fz = g[FORCE], g[FORCE + 1], g[FORCE + 2]
     n = g[MATRIX] * fx + g[MATRIX + 1] * fy + g[MATRIX + 2] * fz
     e = g[MATRIX + 3] * fx + g[MATRIX + 4] * fy + g[MATRIX + 5] * fz
@@ -190,11 +207,8 @@ def scale_terms(g: Array) -> None:
 @kernel
 def error_model(g: Array, dt: float, near: Array) -> None:
     """Write F dt, but for the terms of scales, and Q dt / 2 at the fused state, that of the start of the interval."""
-    for i in range(3):
-        g[F + (_V + i) * HALF + i] = dt
-    if near[0] != 0.0:
-        _earth_terms(g, dt, near[1], near[2], near[3])
-    _sensor_terms(g, dt)
+    earth_terms(g, dt, near)
+    sensor_terms(g, dt)
 
 
 Three = tuple[float, float, float]

@@ -119,9 +119,10 @@ def rotate_to_n(w: Array) -> None:
     """Rotate the velocity increment into n with the IMU's attitude at the start of the interval (over DVEL_N)."""
     for i in range(LANES):
         x, y, z = w[DVEL_N + X + i], w[DVEL_N + Y + i], w[DVEL_N + Z + i]
-        for row in range(3):
-            m = MATRIX + 3 * row * LANES + i
-            w[DVEL_N + row * LANES + i] = w[m] * x + w[m + LANES] * y + w[m + 2 * LANES] * z
+        m = MATRIX + i
+        w[DVEL_N + X + i] = w[m] * x + w[m + LANES] * y + w[m + 2 * LANES] * z
+        w[DVEL_N + Y + i] = w[m + 3 * LANES] * x + w[m + 4 * LANES] * y + w[m + 5 * LANES] * z
+        w[DVEL_N + Z + i] = w[m + 6 * LANES] * x + w[m + 7 * LANES] * y + w[m + 8 * LANES] * z
 
 
 @formula
