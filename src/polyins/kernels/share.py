@@ -37,15 +37,16 @@ HALF_Q = _take(6 * SENSORS)  # by rows of velocity and phi, columns from the sec
 # products
 T = _take(NAV * STRIDE)
 W = _take(NAV * HALF)
-SCALE = _take(16)  # 1 - LOST
-NOISE = _take(16)
+SCALE = _take(STRIDE)  # 1 - LOST
+NOISE = _take(STRIDE)
 RATIO = _take(SENSORS)  # what a scale does for each unit of what the bias beside it does
 U = _take(NAV * SENSORS)
 S = _take(NAV * SENSORS)
 Z = _take(NAV * SENSORS)
-ERROR_PSD = _take(16)  # twelve, 2 sigma^2 / tau of each Gauss-Markov process
-DECAY = _take(16)  # twelve, 1 / tau
-LOST = _take(16)  # the IMU errors that P speaks of are those of the filter divided by 1 less this
+# twelve each; longer loops than these would need, since LLVM unrolls short ones before it could vectorize
+ERROR_PSD = _take(STRIDE)  # 2 sigma^2 / tau of each Gauss-Markov process
+DECAY = _take(STRIDE)  # 1 / tau
+LOST = _take(STRIDE)  # the IMU errors that P speaks of are those of the filter divided by 1 less this
 BASES = _take(16)  # work of the means, see `fuse`
 LANE_SUMS = _take(16 * 8)
 # the fused state of the members, and the mean of their corrected increments as rates
@@ -313,7 +314,7 @@ def _scale(g: Array, dt: float) -> None:
     g[SINCE] += dt
     half = 0.5 * (g[OWED] + dt)
     g[OWED] = dt
-    for k in range(HALF):
+    for k in range(STRIDE):
         scale = 1.0 - g[LOST + k]
         g[SCALE + k] = scale
         g[NOISE + k] = half * g[ERROR_PSD + k] / (scale * scale)
@@ -448,8 +449,9 @@ def predict(g: Array, dt: float) -> None:
     is neither zero nor one is multiplied. C' and the scales are left behind: `complete` brings P up to date, and who
     only looks at P heeds `scale_of` and `owed`, so that a look changes no bit.
     """
-    _scale(g, dt)
+    # in an order that lets what was written number by number reach the cache before it is read in vectors
     _add_half_noise(g)
+    _scale(g, dt)
     _through_navigation(g, dt)
     _through_sensors(g)
     _felt_by_rows(g)
