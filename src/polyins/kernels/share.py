@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from polyins.kernels import earth
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import Array, formula, kernel
 from polyins.kernels.layout import Layout
 
 STATES = 24
@@ -385,33 +385,76 @@ def _felt_by_rows(g: Array) -> None:
         _put_u(g, 8, j, scale, ratio)
 
 
+Nine = tuple[Three, Three, Three]
+
+
 @kernel
-def _back_row(g: Array, i: int) -> None:
-    """Row i of S = (A N) A' + W G' + Q / 2 and of Z = W G', all columns but the first."""
-    t, u = T + i * STRIDE, U + i * SENSORS
-    r, v, p = _column(g, t, 1), _column(g, t + _V, 1), _column(g, t + _P, 1)
-    b, a = _column(g, u, 1), _column(g, u + 3, 1)
+def _factors_of_row(g: Array, i: int) -> Nine:
+    t = T + i * STRIDE
+    return _column(g, t, 1), _column(g, t + _V, 1), _column(g, t + _P, 1)
+
+
+@kernel
+def _put_s(g: Array, i: int, j: int, t: Nine, r: Three, v: Three, p: Three) -> None:
+    g[S + i * SENSORS + j] = g[T + i * STRIDE + 1 + j] + _dot(t[0], r) + _dot(t[1], v) + _dot(t[2], p)
+
+
+@formula
+def _navigation_rows(g: Array, i: int) -> None:
+    """Write three rows of S = (A N) A' from the i-th on, all columns but the first."""
+    t0, t1, t2 = _factors_of_row(g, i), _factors_of_row(g, i + 1), _factors_of_row(g, i + 2)
     for j in range(SENSORS):
-        f = F + 1 + j
-        z = _dot(b, _column(g, f + _G * HALF, HALF)) + _dot(a, _column(g, f + _A * HALF, HALF))
-        g[Z + i * SENSORS + j] = z
-        n = g[t + 1 + j] + _dot(r, _column(g, f, HALF))
-        n += _dot(v, _column(g, f + _V * HALF, HALF)) + _dot(p, _column(g, f + _P * HALF, HALF))
-        g[S + i * SENSORS + j] = n + z
+        r, v, p = (
+            _column(g, F + 1 + j, HALF),
+            _column(g, F + _V * HALF + 1 + j, HALF),
+            _column(g, F + _P * HALF + 1 + j, HALF),
+        )
+        _put_s(g, i, j, t0, r, v, p)
+        _put_s(g, i + 1, j, t1, r, v, p)
+        _put_s(g, i + 2, j, t2, r, v, p)
 
 
 @kernel
 def _back_to_navigation(g: Array) -> None:
-    """N = S + Z', the upper triangle and by symmetry the lower one."""
-    _back_row(g, 0)
-    _back_row(g, 1)
-    _back_row(g, 2)
-    _back_row(g, 3)
-    _back_row(g, 4)
-    _back_row(g, 5)
-    _back_row(g, 6)
-    _back_row(g, 7)
-    _back_row(g, 8)
+    """S = (A N) A'."""
+    _navigation_rows(g, 0)
+    _navigation_rows(g, 3)
+    _navigation_rows(g, 6)
+
+
+@kernel
+def _put_z(g: Array, i: int, j: int, b: Three, a: Three, rate: Three, force: Three) -> None:
+    z = _dot(b, rate) + _dot(a, force)
+    g[Z + i * SENSORS + j] = z
+    g[S + i * SENSORS + j] += z
+
+
+@formula
+def _sensor_rows(g: Array, i: int) -> None:
+    """Write three rows of Z = W G' from the i-th on and add them to those of S."""
+    b0, b1, b2 = (
+        _column(g, U + i * SENSORS, 1),
+        _column(g, U + (i + 1) * SENSORS, 1),
+        _column(g, U + (i + 2) * SENSORS, 1),
+    )
+    a0, a1, a2 = (
+        _column(g, U + i * SENSORS + 3, 1),
+        _column(g, U + (i + 1) * SENSORS + 3, 1),
+        _column(g, U + (i + 2) * SENSORS + 3, 1),
+    )
+    for j in range(SENSORS):
+        rate, force = _column(g, F + _G * HALF + 1 + j, HALF), _column(g, F + _A * HALF + 1 + j, HALF)
+        _put_z(g, i, j, b0, a0, rate, force)
+        _put_z(g, i + 1, j, b1, a1, rate, force)
+        _put_z(g, i + 2, j, b2, a2, rate, force)
+
+
+@kernel
+def _from_sensors(g: Array) -> None:
+    """N = S + Z' + Q / 2, the upper triangle and by symmetry the lower one."""
+    _sensor_rows(g, 0)
+    _sensor_rows(g, 3)
+    _sensor_rows(g, 6)
     g[P] = g[T] + _dot(_column(g, T, 1), _column(g, F, HALF)) + g[T + _V] * g[F + _V * HALF]
     for i in range(3):  # no IMU error moves a position: Z' has no such rows
         for j in range(max(i, 1), NAV):
@@ -454,8 +497,9 @@ def predict(g: Array, dt: float) -> None:
     _scale(g, dt)
     _through_navigation(g, dt)
     _through_sensors(g)
-    _felt_by_rows(g)
     _back_to_navigation(g)
+    _felt_by_rows(g)
+    _from_sensors(g)
 
 
 @kernel
