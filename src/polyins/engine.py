@@ -135,19 +135,13 @@ def propagate(
             if b == 0:
                 fuse.begin_means(w, groups[-1])
             fuse.add_to_means(w, groups[-1])
-    if origin is not None and members.shape[0] > 1:
-        share.earth_terms(groups[-1], dt, near)
     for s in range(members.shape[0]):
         g = groups[s]
         if origin is not None and members[s, 1] - members[s, 0] > 1:
             fuse.finish_measurements(g, dt)
         else:
             fuse.fuse_measurements(blocks, members[s, 0], members[s, 1], g, dt)
-        if origin is not None and members.shape[0] > 1:
-            share.copy_earth_terms(groups[-1], g)
-            share.sensor_terms(g, dt)
-        else:
-            share.error_model(g, dt, near)
+        share.error_model(g, dt, near)
         if work is None:
             share.predict(g, dt)
         elif joined is None:

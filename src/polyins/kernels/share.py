@@ -77,27 +77,11 @@ BY_N, BY_E, BY_D, BY_VN, BY_VE, BY_VD = (F + k * HALF for k in range(6))
 
 
 @kernel
-def earth_terms(g: Array, dt: float, near: Array) -> None:
-    """Write the terms of F dt that only the fused state tells, that of the start of the interval.
+def _earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: float) -> None:
+    """Write the terms of F dt that come from earth rate, transport rate and gravity.
 
-    Complete phi-angle model in n with position errors in metres; see docs/theory. `near` as for `earth.evaluate`.
+    Complete phi-angle model in n with position errors in metres; see docs/theory.
     """
-    for i in range(3):
-        g[F + (_V + i) * HALF + i] = dt
-    if near[0] != 0.0:
-        _curved_earth_terms(g, dt, near[1], near[2], near[3])
-
-
-@kernel
-def copy_earth_terms(source: Array, g: Array) -> None:
-    """Take the terms of another fused state, metres apart; for what that leaves out see docs/theory."""
-    for n in range(NAV * HALF):
-        g[F + n] = source[F + n]
-
-
-@kernel
-def _curved_earth_terms(g: Array, dt: float, latitude: float, sine: float, cosine: float) -> None:
-    """Write the terms that come from earth rate, transport rate and gravity."""
     d = g[POSITION] - latitude
     sin_d = d * (1.0 - d * d / 6.0)
     cos_d = 1.0 - d * d * (0.5 - d * d / 24.0)
@@ -166,8 +150,8 @@ def _skew(g: Array, row: int, column: int, x: float, y: float, z: float) -> None
 
 
 @kernel
-def sensor_terms(g: Array, dt: float) -> None:
-    """Write the terms of F dt that come from attitude and biases, but for those of scales, and Q dt / 2."""
+def _sensor_terms(g: Array, dt: float) -> None:
+    """Write the terms of F dt that come from attitude and biases, and half of the noise over dt."""
     fx, fy, fz = g[FORCE], g[FORCE + 1], g[FORCE + 2]
     n = g[MATRIX] * fx + g[MATRIX + 1] * fy + g[MATRIX + 2] * fz
     e = g[MATRIX + 3] * fx + g[MATRIX + 4] * fy + g[MATRIX + 5] * fz
@@ -208,8 +192,11 @@ def scale_terms(g: Array) -> None:
 @kernel
 def error_model(g: Array, dt: float, near: Array) -> None:
     """Write F dt, but for the terms of scales, and Q dt / 2 at the fused state, that of the start of the interval."""
-    earth_terms(g, dt, near)
-    sensor_terms(g, dt)
+    for i in range(3):
+        g[F + (_V + i) * HALF + i] = dt
+    if near[0] != 0.0:
+        _earth_terms(g, dt, near[1], near[2], near[3])
+    _sensor_terms(g, dt)
 
 
 Three = tuple[float, float, float]
