@@ -390,7 +390,8 @@ def load(blocks: Array, raw: Array) -> None:
     count = raw.shape[1]
     for k in range(6):  # row by row: memory is fetched ahead only where it is read in order
         for b in range(count // LANES):
-            bank.put_eight(blocks[b], bank.RAW_DTHETA + k * LANES, raw[k], b * LANES)
+            for i in range(LANES):
+                blocks[b, bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
         for i in range(count // LANES * LANES, count):
             blocks[i // LANES, bank.RAW_DTHETA + k * LANES + i % LANES] = raw[k, i]
 

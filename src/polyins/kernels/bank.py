@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy.typing as npt
 
-from polyins.kernels.jit import kernel
 from polyins.kernels.layout import Layout
 
 Array = npt.NDArray[Any]
@@ -75,13 +74,3 @@ SIZE = _layout.size
 def put(w: Array, field: int, lane: int, values: Array) -> None:
     """Write the field of one IMU, a number or more."""
     w[field + lane : field + lane + len(values) * LANES : LANES] = values
-
-
-@kernel
-def put_eight(w: Array, field: int, values: Array, first: int) -> None:
-    """Write the field of a whole block from values `first` ... `first` + 7."""
-    # all read before any is written: one load and one store of a vector, whatever the arrays have in common
-    a, b, c, d = values[first], values[first + 1], values[first + 2], values[first + 3]
-    e, f, g, h = values[first + 4], values[first + 5], values[first + 6], values[first + 7]
-    w[field], w[field + 1], w[field + 2], w[field + 3] = a, b, c, d
-    w[field + 4], w[field + 5], w[field + 6], w[field + 7] = e, f, g, h

@@ -12,7 +12,7 @@ EIGHT = 8
 
 
 def zeros(*shape: int) -> npt.NDArray[Any]:
-    """Return zeros that begin with a cache line, so that each vector of eight lies in one, which halves its traffic."""
+    """Return zeros that begin with a cache line, so that each vector of eight lies in one."""
     count = math.prod(shape)
     room = np.zeros(count + EIGHT - 1)
     first = -(room.ctypes.data // room.itemsize) % EIGHT

@@ -536,8 +536,14 @@ def complete(g: Array) -> None:
         for k in range(INERTIAL, STATES):
             g[P + i * STRIDE + k] *= scale
         g[P + i * (STRIDE + 1)] += owed(g, i)
+    settle(g)
+    mirror(g)
+
+
+@kernel
+def settle(g: Array) -> None:
+    """Note that P speaks of the states themselves and is owed nothing."""
     for k in range(12):
         g[LOST + k] = 0.0
     g[OWED] = 0.0
     g[SINCE] = 0.0
-    mirror(g)
