@@ -23,6 +23,7 @@ W, G, NEAR = np.zeros(bank.SIZE), np.zeros(share.SIZE), np.zeros(5)
 LOOPS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "compensate": (strapdown.compensate, (W, 1.0, 0.01)),
     "correct_coning_and_sculling": (strapdown.correct_coning_and_sculling, (W, 0.1)),
+    "rotate_at_own_state": (strapdown.rotate_at_own_state, (W,)),
     "evaluate": (earth.evaluate, (W, 0.0, 0.0, 1.0)),
     "advance": (strapdown.advance, (W, 0.01, NEAR)),
     "evaluate_at_fused_state": (fuse.evaluate_at_fused_state, (W, G)),
@@ -33,6 +34,7 @@ LOOPS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "phi_rows": (share._phi_rows, (G,)),
     "through_sensors": (share._through_sensors, (G,)),
     "felt_by_rows": (share._felt_by_rows, (G,)),
+    "back_to_navigation": (share._back_to_navigation, (G,)),
 }
 
 VECTOR = re.compile(r"^\tv(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\w*)pd\t", re.MULTILINE)

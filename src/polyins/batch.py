@@ -15,7 +15,7 @@ from polyins.alignment import Start
 from polyins.engine import Inputs, Outputs, Plan, State
 from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
-from polyins.kernels import bank, dense, kalman, share
+from polyins.kernels import bank, dense, kalman, layout, share
 from polyins.kernels.bank import LANES
 from polyins.methods import Method, find_method
 from polyins.modules import Modules
@@ -214,7 +214,7 @@ def _lay_out_rolling(
     plan = build_plan(row, recording, aligned)
     inputs = build_inputs(recording, replace(complete, increments=complete.increments[:, :, order]))
     speed = [imus[module[0]] for module in chosen.speed]
-    blocks = np.zeros(((len(order) + LANES - 1) // LANES, bank.SIZE))
+    blocks = layout.zeros((len(order) + LANES - 1) // LANES, bank.SIZE)
     blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
     assert start.imu_attitudes is not None
     for lane, i in enumerate(order):
@@ -227,7 +227,7 @@ def _lay_out_rolling(
             start.imu_errors[i],
             recording.geodetic,
         )
-    groups = np.zeros((len(spans) + 1, share.SIZE))
+    groups = layout.zeros(len(spans) + 1, share.SIZE)
     for g, (first, last) in zip(groups, spans, strict=False):
         g[share.WEIGHTS] = last - first
         for lane in range(first, last):
@@ -273,14 +273,14 @@ def build_state(
     """Lay out bank and covariance blocks for a method at its start."""
     count = len(members)
     spans = [(0, count)] if row.shares == "all" else [(i, i + 1) for i in range(count)]
-    blocks = np.zeros(((count + LANES - 1) // LANES, bank.SIZE))
+    blocks = layout.zeros((count + LANES - 1) // LANES, bank.SIZE)
     blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
     interval = inputs.time[1] - inputs.time[0]
     for i, member in enumerate(members):
         rate = (inputs.increments[0, :3, i] / interval - member.start_errors[:3]) / (1.0 + member.start_errors[6:9])
         _fill_lane(blocks[i // LANES], i % LANES, member, start, rate, recording.geodetic)
         blocks[i // LANES, bank.WEIGHT + i % LANES] = 1.0 / count
-    groups = np.zeros((len(spans) + (len(spans) > 1), share.SIZE))
+    groups = layout.zeros(len(spans) + (len(spans) > 1), share.SIZE)
     groups[-1, share.WEIGHTS] = 1.0
     for g, (first, last) in zip(groups, spans, strict=False):
         g[share.WEIGHTS] = (last - first) / count
@@ -305,7 +305,7 @@ def _state(
         blocks=blocks,
         groups=groups,
         members=np.array(spans, dtype=np.int64),
-        measurements=np.zeros((len(spans), kalman.SIZE)),
+        measurements=layout.zeros(len(spans), kalman.SIZE),
         near=near,
         before=np.zeros(4),
         clock=np.array([start.time, inputs.time[1] - inputs.time[0]]),

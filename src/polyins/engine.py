@@ -387,11 +387,13 @@ def aid(
 @kernel
 def load(blocks: Array, raw: Array) -> None:
     """Put the measured increments of one epoch, (6, N), into the lanes."""
-    for b in range(blocks.shape[0]):
-        w = blocks[b]
-        for k in range(6):
-            for i in range(min(LANES, raw.shape[1] - b * LANES)):
-                w[bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
+    count = raw.shape[1]
+    for k in range(6):  # row by row: memory is fetched ahead only where it is read in order
+        for b in range(count // LANES):
+            for i in range(LANES):
+                blocks[b, bank.RAW_DTHETA + k * LANES + i] = raw[k, b * LANES + i]
+        for i in range(count // LANES * LANES, count):
+            blocks[i // LANES, bank.RAW_DTHETA + k * LANES + i % LANES] = raw[k, i]
 
 
 @entry

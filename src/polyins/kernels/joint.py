@@ -103,12 +103,17 @@ def predict(groups: Array, a: int, b: int, dt: float, whole: Array, w: Array) ->
 
 @kernel
 def gather(groups: Array, shares: int, whole: Array) -> None:
-    """Complete the square matrix: blocks on the diagonal from the shares, those left of it by symmetry."""
+    """Complete the square matrix: blocks on the diagonal from the shares, those left of it by symmetry.
+
+    The shares stay as they are, so that a measurement that is rejected changes no bit.
+    """
     for s in range(shares):
-        share.complete(groups[s])
+        g, o = groups[s], s * STATES
         for i in range(STATES):
-            for j in range(STATES):
-                whole[s * STATES + i, s * STATES + j] = groups[s, P + i * STRIDE + j]
+            scale = share.scale_of(g, i)
+            for j in range(i, STATES):
+                whole[o + i, o + j] = g[P + i * STRIDE + j] * (scale * share.scale_of(g, j))
+            whole[o + i, o + i] += share.owed(g, i)
     for i in range(shares * STATES):
         for j in range(i):
             whole[i, j] = whole[j, i]
@@ -121,6 +126,7 @@ def scatter(groups: Array, shares: int, whole: Array) -> None:
         for i in range(STATES):
             for j in range(STATES):
                 groups[s, P + i * STRIDE + j] = whole[s * STATES + i, s * STATES + j]
+        share.settle(groups[s])
 
 
 @kernel

@@ -1,4 +1,22 @@
-"""Names for places in a flat array."""
+"""Names for places in a flat array, and arrays whose vectors of eight do not straddle cache lines."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+EIGHT = 8
+
+
+def zeros(*shape: int) -> npt.NDArray[Any]:
+    """Return zeros that begin with a cache line, so that each vector of eight lies in one."""
+    count = math.prod(shape)
+    room = np.zeros(count + EIGHT - 1)
+    first = -(room.ctypes.data // room.itemsize) % EIGHT
+    return room[first : first + count].reshape(shape)
 
 
 class Layout:
@@ -17,4 +35,4 @@ class Layout:
     @property
     def size(self) -> int:
         """Length of the array, in whole vectors of eight."""
-        return (self._end + 7) // 8 * 8
+        return (self._end + EIGHT - 1) // EIGHT * EIGHT

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from polyins.kernels import earth
-from polyins.kernels.jit import Array, kernel, scalar_kernel
+from polyins.kernels.jit import Array, formula, kernel, scalar_kernel
 from polyins.kernels.layout import Layout
 
 STATES = 24
@@ -29,7 +29,26 @@ _layout = Layout()
 _take = _layout.take
 
 
+# first what loops read and write in vectors of eight, in whole ones
 P = _take(STATES * STRIDE)
+# error model times dt: row k holds what state k does to position, velocity and phi, that is F' without its zero rows
+F = _take(INERTIAL * HALF)
+HALF_Q = _take(6 * SENSORS)  # by rows of velocity and phi, columns from the second on
+# products
+T = _take(NAV * STRIDE)
+W = _take(NAV * HALF)
+SCALE = _take(STRIDE)  # 1 - LOST
+NOISE = _take(STRIDE)
+RATIO = _take(SENSORS)  # what a scale does for each unit of what the bias beside it does
+U = _take(NAV * SENSORS)
+S = _take(NAV * SENSORS)
+Z = _take(NAV * SENSORS)
+# twelve each; longer loops than these would need, since LLVM unrolls short ones before it could vectorize
+ERROR_PSD = _take(STRIDE)  # 2 sigma^2 / tau of each Gauss-Markov process
+DECAY = _take(STRIDE)  # 1 / tau
+LOST = _take(STRIDE)  # the IMU errors that P speaks of are those of the filter divided by 1 less this
+BASES = _take(16)  # work of the means, see `fuse`
+LANE_SUMS = _take(16 * 8)
 # the fused state of the members, and the mean of their corrected increments as rates
 POSITION = _take(3)
 VELOCITY = _take(3)
@@ -39,31 +58,14 @@ RATE = _take(3)  # rad/s
 FORCE = _take(3)  # m/s^2
 VEHICLE = _take(9)  # C_nv of a vehicle with wheels
 WEIGHTS = _take(1)  # sum of the members' weights
-BASES = _take(16)  # work of the means, see `fuse`
-LANE_SUMS = _take(16 * 8)
 METRIC = _take(3)  # metres per unit of each coordinate at the last fix
 ANTENNA = _take(3)  # from the point of the fused state, in array axes, m
 # noise of one member
 GYRO_PSD = _take(3)  # angle random walk squared, rad^2/s
 ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
-ERROR_PSD = _take(16)  # twelve, 2 sigma^2 / tau of each Gauss-Markov process
-DECAY = _take(16)  # twelve, 1 / tau
-LOST = _take(16)  # the IMU errors that P speaks of are those of the filter divided by 1 less this
 OWED = _take(1)  # seconds for which half of their noise is yet to be added
 SINCE = _take(1)  # seconds since P was completed
 FASTEST = _take(1)  # the largest 1 / tau
-# error model times dt: row k holds what state k does to position, velocity and phi, that is F' without its zero rows
-F = _take(INERTIAL * HALF)
-HALF_Q = _take(6 * SENSORS)  # by rows of velocity and phi, columns from the second on
-# products
-T = _take(NAV * STRIDE)
-W = _take(NAV * HALF)
-SCALE = _take(16)  # 1 - LOST
-NOISE = _take(16)
-RATIO = _take(SENSORS)  # what a scale does for each unit of what the bias beside it does
-U = _take(NAV * SENSORS)
-S = _take(NAV * SENSORS)
-Z = _take(NAV * SENSORS)
 
 SIZE = _layout.size
 
@@ -299,7 +301,7 @@ def _scale(g: Array, dt: float) -> None:
     g[SINCE] += dt
     half = 0.5 * (g[OWED] + dt)
     g[OWED] = dt
-    for k in range(HALF):
+    for k in range(STRIDE):
         scale = 1.0 - g[LOST + k]
         g[SCALE + k] = scale
         g[NOISE + k] = half * g[ERROR_PSD + k] / (scale * scale)
@@ -370,33 +372,76 @@ def _felt_by_rows(g: Array) -> None:
         _put_u(g, 8, j, scale, ratio)
 
 
+Nine = tuple[Three, Three, Three]
+
+
 @kernel
-def _back_row(g: Array, i: int) -> None:
-    """Row i of S = (A N) A' + W G' + Q / 2 and of Z = W G', all columns but the first."""
-    t, u = T + i * STRIDE, U + i * SENSORS
-    r, v, p = _column(g, t, 1), _column(g, t + _V, 1), _column(g, t + _P, 1)
-    b, a = _column(g, u, 1), _column(g, u + 3, 1)
+def _factors_of_row(g: Array, i: int) -> Nine:
+    t = T + i * STRIDE
+    return _column(g, t, 1), _column(g, t + _V, 1), _column(g, t + _P, 1)
+
+
+@kernel
+def _put_s(g: Array, i: int, j: int, t: Nine, r: Three, v: Three, p: Three) -> None:
+    g[S + i * SENSORS + j] = g[T + i * STRIDE + 1 + j] + _dot(t[0], r) + _dot(t[1], v) + _dot(t[2], p)
+
+
+@formula
+def _navigation_rows(g: Array, i: int) -> None:
+    """Write three rows of S = (A N) A' from the i-th on, all columns but the first."""
+    t0, t1, t2 = _factors_of_row(g, i), _factors_of_row(g, i + 1), _factors_of_row(g, i + 2)
     for j in range(SENSORS):
-        f = F + 1 + j
-        z = _dot(b, _column(g, f + _G * HALF, HALF)) + _dot(a, _column(g, f + _A * HALF, HALF))
-        g[Z + i * SENSORS + j] = z
-        n = g[t + 1 + j] + _dot(r, _column(g, f, HALF))
-        n += _dot(v, _column(g, f + _V * HALF, HALF)) + _dot(p, _column(g, f + _P * HALF, HALF))
-        g[S + i * SENSORS + j] = n + z
+        r, v, p = (
+            _column(g, F + 1 + j, HALF),
+            _column(g, F + _V * HALF + 1 + j, HALF),
+            _column(g, F + _P * HALF + 1 + j, HALF),
+        )
+        _put_s(g, i, j, t0, r, v, p)
+        _put_s(g, i + 1, j, t1, r, v, p)
+        _put_s(g, i + 2, j, t2, r, v, p)
 
 
 @kernel
 def _back_to_navigation(g: Array) -> None:
-    """N = S + Z', the upper triangle and by symmetry the lower one."""
-    _back_row(g, 0)
-    _back_row(g, 1)
-    _back_row(g, 2)
-    _back_row(g, 3)
-    _back_row(g, 4)
-    _back_row(g, 5)
-    _back_row(g, 6)
-    _back_row(g, 7)
-    _back_row(g, 8)
+    """S = (A N) A'."""
+    _navigation_rows(g, 0)
+    _navigation_rows(g, 3)
+    _navigation_rows(g, 6)
+
+
+@kernel
+def _put_z(g: Array, i: int, j: int, b: Three, a: Three, rate: Three, force: Three) -> None:
+    z = _dot(b, rate) + _dot(a, force)
+    g[Z + i * SENSORS + j] = z
+    g[S + i * SENSORS + j] += z
+
+
+@formula
+def _sensor_rows(g: Array, i: int) -> None:
+    """Write three rows of Z = W G' from the i-th on and add them to those of S."""
+    b0, b1, b2 = (
+        _column(g, U + i * SENSORS, 1),
+        _column(g, U + (i + 1) * SENSORS, 1),
+        _column(g, U + (i + 2) * SENSORS, 1),
+    )
+    a0, a1, a2 = (
+        _column(g, U + i * SENSORS + 3, 1),
+        _column(g, U + (i + 1) * SENSORS + 3, 1),
+        _column(g, U + (i + 2) * SENSORS + 3, 1),
+    )
+    for j in range(SENSORS):
+        rate, force = _column(g, F + _G * HALF + 1 + j, HALF), _column(g, F + _A * HALF + 1 + j, HALF)
+        _put_z(g, i, j, b0, a0, rate, force)
+        _put_z(g, i + 1, j, b1, a1, rate, force)
+        _put_z(g, i + 2, j, b2, a2, rate, force)
+
+
+@kernel
+def _from_sensors(g: Array) -> None:
+    """N = S + Z' + Q / 2, the upper triangle and by symmetry the lower one."""
+    _sensor_rows(g, 0)
+    _sensor_rows(g, 3)
+    _sensor_rows(g, 6)
     g[P] = g[T] + _dot(_column(g, T, 1), _column(g, F, HALF)) + g[T + _V] * g[F + _V * HALF]
     for i in range(3):  # no IMU error moves a position: Z' has no such rows
         for j in range(max(i, 1), NAV):
@@ -434,12 +479,14 @@ def predict(g: Array, dt: float) -> None:
     is neither zero nor one is multiplied. C' and the scales are left behind: `complete` brings P up to date, and who
     only looks at P heeds `scale_of` and `owed`, so that a look changes no bit.
     """
-    _scale(g, dt)
+    # in an order that lets what was written number by number reach the cache before it is read in vectors
     _add_half_noise(g)
+    _scale(g, dt)
     _through_navigation(g, dt)
     _through_sensors(g)
-    _felt_by_rows(g)
     _back_to_navigation(g)
+    _felt_by_rows(g)
+    _from_sensors(g)
 
 
 @kernel
@@ -489,8 +536,14 @@ def complete(g: Array) -> None:
         for k in range(INERTIAL, STATES):
             g[P + i * STRIDE + k] *= scale
         g[P + i * (STRIDE + 1)] += owed(g, i)
+    settle(g)
+    mirror(g)
+
+
+@kernel
+def settle(g: Array) -> None:
+    """Note that P speaks of the states themselves and is owed nothing."""
     for k in range(12):
         g[LOST + k] = 0.0
     g[OWED] = 0.0
     g[SINCE] = 0.0
-    mirror(g)

@@ -115,13 +115,23 @@ def correct_coning_and_sculling(w: Array, ratio: float) -> None:
 
 
 @kernel
-def rotate_to_n(w: Array) -> None:
-    """Rotate the velocity increment into n with the IMU's attitude at the start of the interval (over DVEL_N)."""
+def rotate_at_own_state(w: Array) -> None:
+    """Let each IMU's own state be where the earth is evaluated and what rotates its velocity increment into n.
+
+    One loop, since LLVM unrolls shorter ones before it could vectorize.
+    """
     for i in range(LANES):
+        w[AT_POSITION + X + i] = w[POSITION + X + i]
+        w[AT_POSITION + Y + i] = w[POSITION + Y + i]
+        w[AT_POSITION + Z + i] = w[POSITION + Z + i]
+        w[AT_VELOCITY + X + i] = w[VELOCITY + X + i]
+        w[AT_VELOCITY + Y + i] = w[VELOCITY + Y + i]
+        w[AT_VELOCITY + Z + i] = w[VELOCITY + Z + i]
         x, y, z = w[DVEL_N + X + i], w[DVEL_N + Y + i], w[DVEL_N + Z + i]
-        for row in range(3):
-            m = MATRIX + 3 * row * LANES + i
-            w[DVEL_N + row * LANES + i] = w[m] * x + w[m + LANES] * y + w[m + 2 * LANES] * z
+        m = MATRIX + i
+        w[DVEL_N + X + i] = w[m] * x + w[m + LANES] * y + w[m + 2 * LANES] * z
+        w[DVEL_N + Y + i] = w[m + 3 * LANES] * x + w[m + 4 * LANES] * y + w[m + 5 * LANES] * z
+        w[DVEL_N + Z + i] = w[m + 6 * LANES] * x + w[m + 7 * LANES] * y + w[m + 8 * LANES] * z
 
 
 @formula
@@ -251,6 +261,5 @@ def advance(w: Array, dt: float, near: Array) -> None:
 def mechanize(w: Array, dt: float, ratio: float, near: Array) -> None:
     """Advance the eight IMUs of a block by `dt` seconds, from corrected increments and each IMU's own state."""
     correct_coning_and_sculling(w, ratio)
-    rotate_to_n(w)
-    evaluate_at_own_state(w)
+    rotate_at_own_state(w)
     advance(w, dt, near)
