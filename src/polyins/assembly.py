@@ -78,6 +78,8 @@ class Assembly:
     """s, the usual interval of each IMU; NaN as long as it is not known"""
     silent: NDArray[np.bool_] = field(init=False)
     """IMUs that have not been there for the last epoch, and are not waited for"""
+    even: bool = False
+    """whether nothing waits and all IMUs ended their last sample with the last epoch"""
     behind: int = 0
     """IMUs that are not silent and have nothing after `now`"""
     patience: float = 0.0
@@ -88,7 +90,7 @@ class Assembly:
     """increments, shape (6, N), of the last epoch with data, and its length"""
 
     def __post_init__(self) -> None:
-        room = 4 * KNOWN_AFTER
+        room = 32 * KNOWN_AFTER
         self.stamps = np.zeros((self.count, room))
         self.values = np.zeros((self.count, room, 6))
         self.first = np.zeros(self.count, dtype=np.int64)
@@ -114,6 +116,7 @@ class Assembly:
             return self._insert(i, time, values)
         if self.last[i] == self.stamps.shape[1]:
             self._make_room()
+        self.even = False
         k = self.last[i]
         self.stamps[i, k] = time
         self.values[i, k] = values
@@ -129,9 +132,7 @@ class Assembly:
     def pass_through(self, time: float, values: Array) -> Epoch | None:
         """Return the epoch of samples of all IMUs with one stamp, (N, 6), if nothing waits and nothing is missing."""
         interval = time - self.now
-        if not 0.0 < interval <= USUAL * self.nominal[0] or self.held:
-            return None
-        if (self.first != self.last).any() or (self.before != self.now).any():
+        if not self.even or self.held or not 0.0 < interval <= USUAL * self.nominal[0]:
             return None
         self.now = self.newest = time
         self.before[:] = time
@@ -262,6 +263,7 @@ class Assembly:
     def _look(self) -> None:
         """Take note of who is there and how long to wait for the others."""
         self.behind = int(np.count_nonzero((self.ends <= self.now) & ~self.silent))
+        self.even = bool((self.first == self.last).all() and (self.before == self.now).all())
         self.patience = max(self.wait, (GAP + USUAL) * float(self.nominal.max()))
 
     def _next_stamp(self, i: int, margin: float) -> float:

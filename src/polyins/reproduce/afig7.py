@@ -19,6 +19,8 @@ from polyins.rig import DEG
 
 BEFORE, AFTER = 1.0, 4.0
 """s around the instant at which the front wheels reach the first book: it holds the first two books"""
+ON_THE_LEFT = 1
+"""the IMU on the left end of the longest ruler: most books lie under the left wheels, the first two among them"""
 AXES = "xyz"
 
 
@@ -29,7 +31,7 @@ def reproduce(
     scenario = nonrigid.scenario_of("test B", quick=True)
     hit = scenario.outage_intervals()[0][0]
     scenario = scenario.model_copy(update={"duration_s": hit + AFTER + 1.0, "outages": ()})
-    stream = nonrigid.recording_of(scenario, 0).imus[0]
+    stream = nonrigid.recording_of(scenario, 0).imus[ON_THE_LEFT]
     time, rate, force = around(stream, hit)
     if out is not None:
         write_figure(curves(time - hit, rate / DEG, "rate (deg/s)"), out / "afig7-gyro.html")
