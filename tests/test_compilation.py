@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import pytest
 
-from polyins import compilation
+from polyins import batch, bench, compilation
 from polyins.screen import compilation_said
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -39,8 +39,13 @@ def test_nested_compilations_count_once() -> None:
         assert seconds() > 0.0
 
 
-def test_every_family_starts() -> None:
-    from polyins import batch
-
-    for name, method, recording in compilation._families():
-        assert batch.prepare(recording, method).inputs.time.size > 2, name
+def test_after_a_warm_up_nothing_is_left_to_compile() -> None:
+    families = compilation.warm_up()["families"]
+    assert len(families) == len({family["name"] for family in families}) == 8
+    array, vehicle = bench.array(2, 70.0), bench.vehicle(70.0)
+    with compilation.watched() as seconds:
+        for method in ("single", "nav-fusion", "imu-fusion"):
+            batch.prepare(array, method).advance(1, 20)
+        for method in ("wheel-ins", "dual-wheel-ins"):
+            batch.prepare(vehicle, method).advance(1, 20)
+        assert seconds() == 0.0

@@ -12,7 +12,7 @@ import pytest
 from polyins.comparison import compare, compare_several
 from polyins.errors import InputError
 from polyins.evaluation.summary import rms
-from polyins.parallel import run_all
+from polyins.parallel import in_order, run_all
 from polyins.simulation.scenario import Board, Scenario, simulate
 
 
@@ -28,6 +28,10 @@ def test_results_come_in_the_order_of_the_jobs_whichever_ends_first():
         return "second"
 
     assert run_all([first, second], threads=2) == ["first", "second"]
+
+
+def test_items_keep_their_order():
+    assert in_order(lambda value: value**2, range(20)) == [value**2 for value in range(20)]
 
 
 def test_progress_is_the_mean_share_of_all_jobs_and_ends_at_one():

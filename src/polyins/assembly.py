@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.kernels.resample import assemble, covered_until
+from polyins.recording import usual_interval
 from polyins.timesync import GAP
 
 Array = NDArray[np.float64]
@@ -210,7 +211,7 @@ class Assembly:
             here = slice(self.first[i], self.last[i])
             waiting = self.last[i] - self.first[i]
             if self.first[i] > KNOWN_AFTER:
-                self.nominal[i] = np.median(np.diff(self.stamps[i, : self.first[i]]))
+                self.nominal[i] = usual_interval(self.stamps[i, : self.first[i]])
             self.stamps[i, :waiting] = self.stamps[i, here].copy()
             self.values[i, :waiting] = self.values[i, here].copy()
         self.last -= shift
@@ -229,7 +230,8 @@ class Assembly:
         known = (self.last >= KNOWN_AFTER).all() and self.newest - begin > self.wait
         if not known and not at_end and self.newest - begin < LONGEST_BEGIN:
             return False
-        self.nominal[:] = [_median_interval(stamps[:last]) for stamps, last in zip(self.stamps, self.last, strict=True)]
+        for i, last in enumerate(self.last):
+            self.nominal[i] = usual_interval(self.stamps[i, :last]) if last > 1 else math.nan
         if np.isnan(self.nominal).all():
             return False
         self.nominal[np.isnan(self.nominal)] = np.nanmax(self.nominal)
@@ -322,7 +324,3 @@ class Assembly:
             self.held.clear()
         self.seen = (epoch.increments, interval)
         yield epoch
-
-
-def _median_interval(stamps: Array) -> float:
-    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else math.nan

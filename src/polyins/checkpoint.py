@@ -5,8 +5,8 @@ The numbers are those of the memory, so that a navigator which goes on from the 
 
 from __future__ import annotations
 
+import io
 import json
-import os
 import typing
 import zipfile
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ import polyins
 from polyins.alignment import Start
 from polyins.assembly import Assembly, Epoch
 from polyins.errors import InputError
+from polyins.io.files import write_bytes
 from polyins.recording import FilterOptions
 from polyins.rig import Rig
 
@@ -60,10 +61,9 @@ def write(path: Path, made: Made, assembly: Assembly, timeline: Timeline | None)
     arrays |= {SAMPLES + name: array for name, array in assembly.arrays().items()}
     if timeline is not None:
         arrays |= {LINE + name: array for name, array in timeline.arrays().items()}
-    beside = path.with_name(path.name + ".part")
-    with beside.open("wb") as file:
-        np.savez(file, allow_pickle=False, **arrays)
-    os.replace(beside, path)
+    content = io.BytesIO()
+    np.savez(content, allow_pickle=False, **arrays)
+    write_bytes(path, content.getvalue())
 
 
 def read(path: Path) -> tuple[Made, Arrays, Arrays]:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -47,28 +48,27 @@ def watched(begins: Callable[[], None] | None = None) -> Iterator[Callable[[], f
 
 def warm_up(progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     """Compile what every family of methods needs, unless the cache has it; return the `warmup` document."""
-    from polyins import batch
     from polyins.kernels.jit import CACHE_FOLDER
 
     families = []
     with watched() as seconds:
         cases = _families()
-        for number, (name, method, recording) in enumerate(cases):
+        for number, (name, run) in enumerate(cases):
             before = seconds()
-            batch.prepare(recording, method).advance(1, 1)
+            run()
             families.append({"name": name, "compiled_s": seconds() - before})
             if progress:
                 progress((number + 1) / len(cases))
     return {"polyins": __version__, "cache": str(CACHE_FOLDER), "compiled_s": seconds(), "families": families}
 
 
-def _families() -> list[tuple[str, str, Recording]]:
-    """Return a name, a method and a recording for each set of types that the loop is compiled for."""
+def _families() -> list[tuple[str, Callable[[], None]]]:
+    """Return a name and a run for each set of types that something is compiled for."""
     from polyins import bench
 
     array, vehicle = _headed(bench.array(2, SECONDS)), _headed(bench.vehicle(SECONDS))
     with_gnss = _with_fixes(vehicle)
-    return [
+    batches = [
         ("arrays with GNSS", "enav-fusion", array),
         ("arrays with GNSS velocity", "enav-fusion", _with_velocities(array)),
         ("arrays without GNSS", "enav-fusion", _without_fixes(array)),
@@ -77,6 +77,28 @@ def _families() -> list[tuple[str, str, Recording]]:
         ("wheels, centralized", "triple-ins/centralized", vehicle),
         ("wheels, centralized, with GNSS", "triple-ins/centralized", with_gnss),
     ]
+    runs = [(name, partial(_begin, method, recording)) for name, method, recording in batches]
+    return [*runs, ("clocks of their own, live", partial(_begin_live, array))]
+
+
+def _begin(method: str, recording: Recording) -> None:
+    from polyins import batch
+
+    batch.prepare(recording, method).advance(1, 1)
+
+
+def _begin_live(recording: Recording) -> None:
+    from polyins import alignment, timesync
+    from polyins.navigator import Navigator
+
+    first, second = recording.imus
+    recording = replace(recording, imus=(first, replace(second, time=second.time - 0.5 / second.rate_hz)))
+    start = alignment.find_start(recording, timesync.align(recording.imus))
+    navigator = Navigator(recording.rig, start)
+    for row in range(int(np.searchsorted(first.time, start.time)) + 3):
+        for i, stream in enumerate(recording.imus):
+            navigator.imu(stream.time[row], stream.dtheta[row], stream.dvel[row], i)
+    navigator.flush()
 
 
 def _with_velocities(recording: Recording) -> Recording:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from threading import Lock
 from typing import TypeVar
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 Progress = Callable[[float], None]
 Job = Callable[[Progress], Result]
@@ -48,6 +49,15 @@ def run_all(
             for future in futures:
                 future.cancel()
             raise board.failure from None
+
+
+def in_order(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """Return what a function makes of each item, in their order, on all cores; errors are those of `run_all`."""
+    return run_all([partial(_apply, function, item) for item in items])
+
+
+def _apply(function: Callable[[Item], Result], item: Item, _: Progress) -> Result:
+    return function(item)
 
 
 class StoppedError(Exception):

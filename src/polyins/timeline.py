@@ -6,21 +6,24 @@ state back to the note before it, and the epochs since then are taken again: the
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins import engine
-from polyins.aiding.rolling import Joint, Rolling
+from polyins.aiding.rolling import Joint
 from polyins.batch import Prepared, build_outputs
-from polyins.engine import Inputs, Outputs, Plan, State
+from polyins.engine import Inputs, Outputs, State
 
 Array = NDArray[np.float64]
 
 STRIDE = 16
 """Epochs between two notes."""
 NEVER = 2**62
+REMEMBERED = ("memory", "silent", "returned", "given")
+"""Arrays of `Rolling` that change."""
 ALIGNMENT = 8
 """Numbers: each array of the memory begins on a cache line."""
 
@@ -30,16 +33,14 @@ class Timeline:
 
     def __init__(self, prepared: Prepared, depth: float) -> None:
         """Begin at the first epoch of a run that is laid out; `depth`: how far back a fix may lie, s."""
-        plan, inputs = prepared.plan, prepared.inputs
+        inputs = prepared.inputs
         self.depth = depth
-        self.plan: Plan = plan._replace(log_every=NEVER)
-        self.origin, self.work = prepared.origin, prepared.work
         self.last = 0
         self.fixes = 0
         """how many there are in the window"""
         self.whole = True
         """whether the window still begins at the start"""
-        self._gather_memory(prepared)
+        self.run = self._with_one_memory(prepared)
         interval = float(inputs.time[1] - inputs.time[0])
         size = 4 * STRIDE
         while size < 2.0 * depth / interval:
@@ -48,6 +49,16 @@ class Timeline:
         self.inputs.time[0] = inputs.time[0]
         self.inputs.increments[0] = inputs.increments[0]
         self._note(0)
+
+    @property
+    def inputs(self) -> Inputs:
+        """What the engine is given of the window."""
+        return self.run.inputs
+
+    @property
+    def outputs(self) -> Outputs:
+        """What it writes there."""
+        return self.run.outputs
 
     @property
     def time(self) -> float:
@@ -61,9 +72,9 @@ class Timeline:
         k = self.last + 1
         self.inputs.time[k] = time
         self.inputs.increments[k] = increments
-        if self.rolling is not None:
-            self.rolling.travel[k] = travel
-            self.rolling.present[k] = present
+        if self.run.rolling is not None:
+            self.run.rolling.travel[k] = travel
+            self.run.rolling.present[k] = present
         self.last = k
         self._advance(k, k + 1)
 
@@ -72,7 +83,7 @@ class Timeline:
 
         The variances of `velocity` are not positive where the fix has none.
         """
-        due = self.inputs.time[: self.last + 1 : STRIDE] + self.plan.gnss_snap
+        due = self.inputs.time[: self.last + 1 : STRIDE] + self.run.plan.gnss_snap
         if self.whole:
             due[0] = self.inputs.time[0]
         note = int(np.searchsorted(due, time)) - 1
@@ -86,7 +97,7 @@ class Timeline:
             rows[place + 1 : self.fixes + 1] = rows[place : self.fixes].copy()
             rows[place] = row
         self.fixes += 1
-        if time <= self.time + self.plan.gnss_snap:
+        if time <= self.time + self.run.plan.gnss_snap:
             self.memory[:] = self._notes[note]
             self._advance(note * STRIDE + 1, self.last + 1)
         return True
@@ -95,59 +106,51 @@ class Timeline:
         """Whether there is a fix of that time in the window."""
         return bool((self.inputs.fix_time[: self.fixes] == time).any())
 
-    def _gather_memory(self, prepared: Prepared) -> None:
-        """Move all arrays that change into one, of which they become parts."""
-        changing: list[NDArray[np.generic]] = [array for array in prepared.state if array is not prepared.state.members]
+    def _with_one_memory(self, prepared: Prepared) -> Prepared:
+        """Return the run with all arrays that change moved into one, of which they become parts."""
         rolling, joined = prepared.rolling, prepared.joined
+        changing: list[NDArray[np.generic]] = [array for array in prepared.state if array is not prepared.state.members]
         if rolling is not None:
-            changing += [rolling.memory, rolling.silent, rolling.returned, rolling.given]
+            changing += [getattr(rolling, name) for name in REMEMBERED]
         if joined is not None:
             changing += list(joined)
         ends = np.cumsum([-(-array.size // ALIGNMENT) * ALIGNMENT for array in changing])
         self.memory = np.zeros(ends[-1])
         parts = []
-        for array, end in zip(changing, [0, *ends], strict=False):
-            part = self.memory[end : end + array.size].view(array.dtype).reshape(array.shape)
+        for array, begin in zip(changing, [0, *ends], strict=False):
+            part = self.memory[begin : begin + array.size].view(array.dtype).reshape(array.shape)
             part[:] = array
             parts.append(part)
-        state = iter(parts)
-        self.state = State(*(array if array is prepared.state.members else next(state) for array in prepared.state))
-        self.rolling: Rolling | None = None
-        if rolling is not None:
-            memory, silent, returned, given = (next(state) for _ in range(4))
-            self.rolling = rolling._replace(memory=memory, silent=silent, returned=returned, given=given)
-        self.joined = None if joined is None else Joint(*state)
+        moved = iter(parts)
+        return replace(
+            prepared,
+            plan=prepared.plan._replace(log_every=NEVER),
+            state=State(*(array if array is prepared.state.members else next(moved) for array in prepared.state)),
+            rolling=None if rolling is None else rolling._replace(**{name: next(moved) for name in REMEMBERED}),
+            joined=None if joined is None else Joint(*moved),
+        )
 
     def _allocate(self, epochs: int, fixes: int, imus: int) -> None:
-        velocities = None if self.rolling is not None else np.full((fixes, 6), -1.0)
-        self.inputs = Inputs(
-            np.zeros(epochs), np.zeros((epochs, 6, imus)), np.full(fixes, np.inf), np.zeros((fixes, 6)), velocities
+        rolling = self.run.rolling
+        velocities = None if rolling is not None else np.full((fixes, 6), -1.0)
+        if rolling is not None:
+            shares = len(self.run.state.members)
+            rolling = rolling._replace(travel=np.zeros((epochs, 2)), present=np.ones((epochs, shares), dtype=np.uint8))
+        self.run = replace(
+            self.run,
+            inputs=Inputs(
+                np.zeros(epochs), np.zeros((epochs, 6, imus)), np.full(fixes, np.inf), np.zeros((fixes, 6)), velocities
+            ),
+            outputs=build_outputs(epochs, fixes, imus, NEVER, 12 if rolling is None else 15),
+            rolling=rolling,
         )
-        self.outputs: Outputs = build_outputs(epochs, fixes, imus, NEVER, 12 if self.rolling is None else 15)
         self._notes = np.zeros((epochs // STRIDE + 1, len(self.memory)))
-        if self.rolling is not None:
-            shares = len(self.state.members)
-            self.rolling = self.rolling._replace(
-                travel=np.zeros((epochs, 2)), present=np.ones((epochs, shares), dtype=np.uint8)
-            )
 
     def _advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1, with a note wherever one is due."""
         while first < last:
             stop = min(last, (first - 1) // STRIDE * STRIDE + STRIDE + 1)
-            engine.run_epochs(
-                self.state,
-                self.plan,
-                self.inputs,
-                self.outputs,
-                first,
-                stop,
-                self.inputs.fixes,
-                self.work,
-                self.origin,
-                self.rolling,
-                self.joined,
-            )
+            self.run.advance(first, stop)
             if (stop - 1) % STRIDE == 0:
                 self._note((stop - 1) // STRIDE)
             first = stop
@@ -186,10 +189,10 @@ class Timeline:
         self.last -= first
         self.fixes = kept
         self.whole = self.whole and gone == 0
-        engine.gather_idle_lanes(self.state.blocks, self.state.members)
+        engine.gather_idle_lanes(self.run.state.blocks, self.run.state.members)
 
     def _by_epoch(self) -> list[NDArray[np.generic]]:
-        travelled = [] if self.rolling is None else [self.rolling.travel, self.rolling.present]
+        travelled = [] if self.run.rolling is None else [self.run.rolling.travel, self.run.rolling.present]
         return [self.inputs.time, self.inputs.increments, self.outputs.states, self.outputs.variances, *travelled]
 
     def _by_fix(self) -> list[NDArray[np.generic]]:
@@ -198,7 +201,7 @@ class Timeline:
 
     def _counters(self, rows: Array) -> NDArray[np.int64]:
         """Return the counters in notes, (., memory)."""
-        here = self.state.counters
+        here = self.run.state.counters
         begin = (here.ctypes.data - self.memory.ctypes.data) // 8
         return rows[:, begin : begin + len(here)].view(np.int64)
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import threading
 import time
 import urllib.request
@@ -11,24 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from headless import chromium
 
 from polyins.live import page as live_page
 from polyins.live import run as live_run
 from polyins.live.snapshot import Snapshot
 
-CHROMIUM = shutil.which("chromium")
-DRIVER = shutil.which("chromedriver")
-FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--window-size=1300,1000",
-)
 FAR = 30.0  # s
 READ = """
 const text = id => document.getElementById(id).textContent;
@@ -49,17 +36,8 @@ BLUE, ORANGE = "0,114,178", "213,94,0"
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    if CHROMIUM is None or DRIVER is None:
-        pytest.skip("no chromium or chromedriver on the path")
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    yield driver
-    driver.quit()
+    with chromium(tmp_path_factory.mktemp("profile"), (1300, 1000)) as driver:
+        yield driver
 
 
 def wait_for(value: Callable[[], Any]) -> Any:

@@ -8,7 +8,6 @@ import pytest
 
 from polyins.errors import InputError
 from polyins.reproduce import afig6, afig7, targets, together
-from polyins.reproduce.parallel import in_order
 
 Document = dict[str, Any]
 
@@ -53,10 +52,6 @@ def test_all_targets_are_one_document_and_one_page(tmp_path: Path) -> None:
         assert expected in page
     assert (tmp_path / "a3.json").exists()
     assert not (tmp_path / "flights.json").exists()
-
-
-def test_results_keep_the_order_of_their_items() -> None:
-    assert in_order(lambda value: value**2, range(20)) == [value**2 for value in range(20)]
 
 
 def test_targets_of_pictures_are_targets() -> None:

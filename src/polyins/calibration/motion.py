@@ -29,10 +29,6 @@ class Running:
         columns = [np.interp(end, self.edges, c) - np.interp(begin, self.edges, c) for c in self.sums.T]
         return np.column_stack(columns)
 
-    def shifted(self, offset: float) -> Running:
-        """Return the same with `offset` seconds added to the stamps."""
-        return Running(self.edges + offset, self.sums)
-
 
 @dataclass(frozen=True)
 class Motion:

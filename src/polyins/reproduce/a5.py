@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polyins.parallel import in_order
 from polyins.recording import Recording
 from polyins.reproduce import nonrigid
-from polyins.reproduce.parallel import in_order
 from polyins.reproduce.pictures import lines, write_figure
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.rigid_array import Array, maxima

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.parallel import in_order
 from polyins.recording import Recording
 from polyins.reproduce import nonrigid
 from polyins.reproduce.feedback import outage_maxima
-from polyins.reproduce.parallel import in_order
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.rigid_array import maxima
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from polyins import __version__, results
 from polyins.errors import InputError
 from polyins.io.files import write_bytes
+from polyins.parallel import in_order
 from polyins.reproduce import targets
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.targets import Document
@@ -54,8 +53,7 @@ def reproduce(
         return document
 
     longest_first = sorted((each for each in names if each not in ALONE), key=lambda each: -expected[each])
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = dict(zip(longest_first, pool.map(run, longest_first), strict=True))
+    found = dict(zip(longest_first, in_order(run, longest_first), strict=True))
     found |= {each: run(each) for each in names if each in ALONE}
     documents = {each: document for each in names if not isinstance(document := found[each], str)}
     missing = {each: reason for each in names if isinstance(reason := found[each], str)}
