@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -177,3 +179,12 @@ def test_a_part_includes_both_ends() -> None:
     part = aligned.between(aligned.time[100], aligned.time[200])
     np.testing.assert_array_equal(part.time, aligned.time[100:201])
     np.testing.assert_array_equal(part.increments, aligned.increments[100:201])
+
+
+@pytest.mark.parametrize("imus", [1, 3, 8, 11, 16])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_streams_lie_side_by_side(imus: int, order: Literal["C", "F"]) -> None:
+    rng, time = np.random.default_rng(imus), 0.01 * np.arange(1, 701)
+    values = [np.asarray(rng.standard_normal((700, 6)), order=order) for _ in range(imus)]
+    streams = tuple(ImuStream(f"imu{i}", time, v[:, :3], v[:, 3:]) for i, v in enumerate(values))
+    np.testing.assert_array_equal(align(streams).increments, np.stack(values, axis=2))

@@ -118,6 +118,7 @@ class _Search:
         self.options: StartOptions = recording.start
         self.aligned = aligned
         self.sources: dict[str, str] = {}
+        self.measured: dict[tuple[float, float], tuple[Array, float]] = {}
         self.errors = np.array([imu.initial_errors.as_array() for imu in recording.rig.imus])
         self.error_std = np.array([imu.start_std() for imu in recording.rig.imus])
         self.fixes = velocities_from_positions(recording.gnss, recording.geodetic) if recording.gnss else None
@@ -234,13 +235,10 @@ class _Search:
 
         What is missing counts only for an IMU that has nothing else there.
         """
-        part = self.aligned.between(begin, end)
-        duration = part.time[-1] - part.time[0]
-        have = ~part.missing[1:]
-        have[:, ~have.any(axis=0)] = True
-        measured = np.diff(part.time) @ have
-        mean = np.einsum("tki,ti->ik", part.increments[1:], have) / measured[:, None]
-        return mean[:, :3] - self.errors[:, :3], mean[:, 3:] - self.errors[:, 3:6], float(duration)
+        if (begin, end) not in self.measured:
+            self.measured[begin, end] = _measured(self.aligned.between(begin, end))
+        mean, duration = self.measured[begin, end]
+        return mean[:, :3] - self.errors[:, :3], mean[:, 3:] - self.errors[:, 3:6], duration
 
     def _roll_pitch(
         self, time: float, still: tuple[float, float] | None, velocity: Array
@@ -452,6 +450,14 @@ class _RollingSearch(_Search):
                 imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std
             )
         self.sources["gyro_bias"] = f"mean of {duration:.1f} s at standstill"
+
+
+def _measured(part: Aligned) -> tuple[Array, float]:
+    """Return the mean rates and specific forces of each IMU, shape (N, 6), and the time in which they were measured."""
+    have = ~part.missing[1:]
+    have[:, ~have.any(axis=0)] = True
+    mean = np.einsum("tki,ti->ik", part.increments[1:], have) / (np.diff(part.time) @ have)[:, None]
+    return mean, float(part.time[-1] - part.time[0])
 
 
 def usual_velocity(fixes: GnssStream) -> Array:

@@ -276,10 +276,9 @@ def build_state(
     blocks = layout.zeros((count + LANES - 1) // LANES, bank.SIZE)
     blocks[:, bank.QUATERNION : bank.QUATERNION + LANES] = 1.0
     interval = inputs.time[1] - inputs.time[0]
-    for i, member in enumerate(members):
-        rate = (inputs.increments[0, :3, i] / interval - member.start_errors[:3]) / (1.0 + member.start_errors[6:9])
-        _fill_lane(blocks[i // LANES], i % LANES, member, start, rate, recording.geodetic)
-        blocks[i // LANES, bank.WEIGHT + i % LANES] = 1.0 / count
+    errors = np.array([member.start_errors for member in members])
+    rates = (inputs.increments[0, :3, :count].T / interval - errors[:, :3]) / (1.0 + errors[:, 6:9])
+    _fill_lanes(blocks, members, start, rates, recording.geodetic)
     groups = layout.zeros(len(spans) + (len(spans) > 1), share.SIZE)
     groups[-1, share.WEIGHTS] = 1.0
     for g, (first, last) in zip(groups, spans, strict=False):
@@ -313,17 +312,20 @@ def _state(
     )
 
 
-def _fill_lane(w: Array, lane: int, member: Member, start: Start, rate: Array, geodetic: bool) -> None:
-    """Put a member where it is mounted, moving as the turning array does: `rate` is its own, rad/s."""
-    c = alignment.rotation_matrix(start.attitude)
-    lever_arm = c @ -member.to_origin
-    turning = c @ rate - alignment.earth_rate(start.position, geodetic)
-    bank.put(w, bank.POSITION, lane, start.position + lever_arm / metres_per_unit(start.position, geodetic))
-    bank.put(w, bank.VELOCITY, lane, start.velocity + np.cross(turning, lever_arm))
-    bank.put(w, bank.QUATERNION, lane, alignment.quaternion(start.attitude))
-    bank.put(w, bank.ERRORS, lane, member.start_errors)
-    bank.put(w, bank.TO_ORIGIN, lane, member.to_origin)
-    bank.put(w, bank.TO_ANTENNA, lane, member.to_antenna)
+def _fill_lanes(blocks: Array, members: list[Member], start: Start, rates: Array, geodetic: bool) -> None:
+    """Put members where they are mounted, moving as the turning array does: `rates` are their own, rad/s, (N, 3)."""
+    c, q = alignment.rotation_matrix(start.attitude), alignment.quaternion(start.attitude)
+    metres, earth_rate = metres_per_unit(start.position, geodetic), alignment.earth_rate(start.position, geodetic)
+    for i, (member, rate) in enumerate(zip(members, rates, strict=True)):
+        w, lane = blocks[i // LANES], i % LANES
+        lever_arm = c @ -member.to_origin
+        bank.put(w, bank.POSITION, lane, start.position + lever_arm / metres)
+        bank.put(w, bank.VELOCITY, lane, start.velocity + np.cross(c @ rate - earth_rate, lever_arm))
+        bank.put(w, bank.QUATERNION, lane, q)
+        bank.put(w, bank.ERRORS, lane, member.start_errors)
+        bank.put(w, bank.TO_ORIGIN, lane, member.to_origin)
+        bank.put(w, bank.TO_ANTENNA, lane, member.to_antenna)
+        w[bank.WEIGHT + lane] = 1.0 / len(members)
 
 
 def _fill_share(g: Array, members: list[Member], start: Start, rig: Rig) -> None:

@@ -15,7 +15,7 @@ from polyins.recording import Recording
 
 RECORDINGS = 8
 """at a time"""
-ROUNDS = 5
+ROUNDS = 9
 SECONDS = 300.0
 METHOD = "enav-fusion"
 

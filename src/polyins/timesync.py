@@ -16,9 +16,6 @@ Array = NDArray[np.float64]
 LATE = 1.0
 """s: an IMU that begins so long after the others is waited for, one that ends so long before them is not"""
 
-BLOCK = 512
-"""epochs interleaved at once: what is written stays in the cache until all streams have had their turn"""
-
 GAP = 3.5
 """An interval longer than this many nominal ones is a gap: what was measured in it is lost."""
 
@@ -56,18 +53,18 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Seque
     streams are a part of longer ones, `gap_counts` says how many gaps those have. Raises InputError if less than two
     seconds are common.
     """
-    time = _common_time(streams, gap_counts or [len(gaps_of(stream.time)) for stream in streams])
+    gaps_by_stream = [gaps_of(stream.time) for stream in streams]
+    time = _common_time(streams, gap_counts or [len(gaps) for gaps in gaps_by_stream])
     on_base: list[tuple[Array, Array]] = []
     missing = np.zeros((len(time), len(streams)), dtype=bool)
     warnings = late_warnings(streams)
-    for i, stream in enumerate(streams):
+    for i, (stream, known) in enumerate(zip(streams, gaps_by_stream, strict=True)):
         if len(stream.time) == len(time) and np.array_equal(stream.time, time):
             on_base.append((stream.dtheta, stream.dvel))
         else:
             values = _resample(stream.time, np.hstack([stream.dtheta, stream.dvel]), time)
             on_base.append((values[:, :3], values[:, 3:]))
-        gaps = gaps_of(stream.time)
-        gaps = [g for g in gaps if g[1] > time[0] and g[0] < time[-1]]
+        gaps = [g for g in known if g[1] > time[0] and g[0] < time[-1]]
         stops = float(stream.time[-1])
         if time[-1] - stops > LATE:
             gaps.append((stops, float(time[-1])))
@@ -76,10 +73,11 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Seque
         if gaps:
             warnings.append(gap_warning(stream.name, gaps))
     increments = _interleaved(on_base, len(time))
-    if bridge and missing.any():
-        _bridge(time, increments, missing)
-    else:
-        increments[np.broadcast_to(missing[:, None, :], increments.shape)] = 0.0
+    if missing.any():
+        if bridge:
+            _bridge(time, increments, missing)
+        else:
+            increments[np.broadcast_to(missing[:, None, :], increments.shape)] = 0.0
     return Aligned(time, increments, tuple(warnings), missing)
 
 
@@ -103,12 +101,14 @@ def common_end(ends: Array) -> float:
 
 def _interleaved(streams: Sequence[tuple[Array, Array]], epochs: int) -> Array:
     """Return the increments of all streams side by side, shape (T, 6, N)."""
+    from polyins.kernels.resample import TOGETHER, interleave
+
     increments = np.empty((epochs, 6, len(streams)))
-    for first in range(0, epochs, BLOCK):
-        rows = slice(first, first + BLOCK)
-        for i, (dtheta, dvel) in enumerate(streams):
-            increments[rows, :3, i] = dtheta[rows]
-            increments[rows, 3:, i] = dvel[rows]
+    for first in range(0, len(streams), TOGETHER):
+        some = [streams[min(i, len(streams) - 1)] for i in range(first, first + TOGETHER)]
+        for row, vectors in enumerate(zip(*some, strict=True)):
+            # of one layout, for which the kernel is compiled once
+            interleave(tuple(map(np.ascontiguousarray, vectors)), first, 3 * row, increments)
     return increments
 
 
@@ -128,14 +128,21 @@ def _common_time(streams: tuple[ImuStream, ...], gap_counts: Sequence[int]) -> A
     ordered = [streams[i] for i in order]
     base: Array = ordered[0].time[(ordered[0].time >= begin) & (ordered[0].time <= end)]
     nominal = usual_interval(base)
+    empty = _empty_until(base, end, nominal)
     for stream in ordered[1:]:
         parts = [base]
-        for first, last in [*gaps_of(base), *([(base[-1], end + nominal)] if end - base[-1] > GAP * nominal else [])]:
+        for first, last in empty:
             inside = (stream.time > first + 0.5 * nominal) & (stream.time < last - 0.5 * nominal)
             parts.append(stream.time[inside])
         if any(map(len, parts[1:])):
             base = np.sort(np.concatenate(parts))
+            empty = _empty_until(base, end, nominal)
     return base
+
+
+def _empty_until(base: Array, end: float, nominal: float) -> list[tuple[float, float]]:
+    """Return the gaps of a clock, and what it lacks until the end."""
+    return [*gaps_of(base), *([(float(base[-1]), end + nominal)] if end - base[-1] > GAP * nominal else [])]
 
 
 def _resample(stamps: Array, values: Array, time: Array) -> Array:

@@ -7,6 +7,13 @@ from __future__ import annotations
 
 from polyins.kernels.jit import Array, entry, kernel
 
+TOGETHER = 8
+"""streams interleaved at once: their numbers fill a cache line"""
+BLOCK = 256
+"""epochs of one axis at once: what they write stays in the cache until the other axes have had their turn"""
+Streams = tuple[Array, ...]
+"""eight of them"""
+
 
 @kernel
 def resample_interval(
@@ -93,3 +100,30 @@ def covered_until(stamps: Array, first: Array, last: Array, before: Array, longe
             if stamps[i, j] - out[i] > longest[i]:
                 break
             out[i] = stamps[i, j]
+
+
+@entry
+def interleave(streams: Streams, first: int, row: int, out: Array) -> None:
+    """Write the vectors of eight streams, each (T, 3), side by side into `out` (T, 6, N) from stream `first` on.
+
+    Their axes go into rows `row` ... `row` + 2. Streams beyond N are not written.
+    """
+    a, b, c, d, e, f, g, h = streams
+    count = out.shape[2] - first
+    for begin in range(0, out.shape[0], BLOCK):
+        for j in range(3):
+            for k in range(begin, min(begin + BLOCK, out.shape[0])):
+                to = out[k, row + j, first:]
+                if count >= TOGETHER:
+                    to[0], to[1], to[2], to[3] = a[k, j], b[k, j], c[k, j], d[k, j]
+                    to[4], to[5], to[6], to[7] = e[k, j], f[k, j], g[k, j], h[k, j]
+                else:
+                    _some(a[k, j], b[k, j], c[k, j], d[k, j], e[k, j], f[k, j], g[k, j], to)
+
+
+@kernel
+def _some(a: float, b: float, c: float, d: float, e: float, f: float, g: float, to: Array) -> None:
+    """Write the first of at most seven numbers."""
+    for i, value in enumerate((a, b, c, d, e, f, g)):
+        if i < len(to):
+            to[i] = value

@@ -198,7 +198,8 @@ def _sense(
         shared=shared,
         vibration=scenario.errors.vibration(run.path.speed(time)),
     )
-    stream = ImuStream(imu.name, time, product(imu.rotation, dtheta), product(imu.rotation, dvel))
+    dtheta, dvel = (np.ascontiguousarray(product(imu.rotation, vectors)) for vectors in (dtheta, dvel))
+    stream = ImuStream(imu.name, time, dtheta, dvel)
     return _calibrated(imu, scenario, errors), stream, errors
 
 
