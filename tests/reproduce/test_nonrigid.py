@@ -1,11 +1,13 @@
 """The flexible array of paper A: what is compared is compared fairly, and what is shared is what is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from polyins import batch
 from polyins.evaluation.errors import compare_to_reference
-from polyins.recording import Recording
+from polyins.recording import ImuStream, Recording
 from polyins.reproduce import a5, a6, nonrigid
 from polyins.reproduce.feedback import outage_maxima
 from polyins.reproduce.progress import Steps
@@ -56,13 +58,39 @@ def miss(recording: Recording, method: str) -> Array:
     return np.asarray(errors.position[np.searchsorted(errors.time, recording.outages[0][1] - 1e-6)])
 
 
+def test_forces_moved_to_the_origin_are_what_the_origin_senses(rigid: Recording) -> None:
+    # turning about z through the origin, ever faster: the origin senses nothing
+    time, dt = 0.005 * np.arange(1, 400), 0.005
+    rate = 2.0 * (time - 0.5 * dt)
+    turning = np.column_stack([0.0 * rate, 0.0 * rate, rate]) * dt
+    places = [imu.position for imu in rigid.rig.imus]
+    forces = [np.cross(turning, np.cross(turning, r)) / dt + np.cross([0.0, 0.0, 2.0], r) * dt for r in places]
+    streams = tuple(ImuStream("any", time, turning, force) for force in forces)
+    moved = nonrigid.with_forces_at_origin(replace(rigid, imus=streams))
+    assert max(np.abs(force).max() for force in forces) > 0.01
+    for stream in moved.imus:
+        np.testing.assert_allclose(stream.dvel[1:], 0.0, atol=1e-12)
+    assert not any(imu.position.any() for imu in moved.rig.imus)
+
+
+def test_on_a_rigid_array_it_does_not_matter_whose_rate_moves_the_forces(rigid: Recording) -> None:
+    np.testing.assert_allclose(a5.errors(rigid, a5.OWN_RATES), a5.errors(rigid, "imu-fusion"), rtol=0.02)
+
+
+def test_own_rates_trouble_imu_fusion_more(lawn: Recording) -> None:
+    own, one = (a5.errors(lawn, name) for name in (a5.OWN_RATES, "imu-fusion"))
+    np.testing.assert_array_equal(own, maxima(nonrigid.with_forces_at_origin(lawn), "imu-fusion"))
+    np.testing.assert_array_equal(one, maxima(lawn, "imu-fusion"))
+    assert abs(own[0] - one[0]) > 0.1
+
+
 def test_figures_are_pooled_over_all_outages_of_all_seeds() -> None:
     maxima_by_seed = {"single": [np.array([3.0, 4.0]), np.array([0.0, 5.0])]}
     assert nonrigid.pooled(maxima_by_seed)["single"] == pytest.approx(np.sqrt(50.0 / 4.0))
 
 
 def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    errors = {"single": 6.0, "imu-fusion": 5.0, "nav-fusion": 2.5, "enav-fusion": 2.0}
+    errors = {"single": 6.0, "imu-fusion": 5.0, a5.OWN_RATES: 5.5, "nav-fusion": 2.5, "enav-fusion": 2.0}
     runs = [{name: np.array([error]) for name, error in errors.items()}]
 
     monkeypatch.setattr(a5, "run", lambda *_: runs)
@@ -74,9 +102,9 @@ def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pyte
     assert document["paper"]["test A"]["ratio_to_rigid_single"]["nav-fusion"] == pytest.approx(1.56, abs=0.005)
     assert document["paper"]["test B"]["ratio_to_rigid_single"]["imu-fusion"] == pytest.approx(1.16, abs=0.005)
     assert sorted(document["polyins"]["roughness_mm"]) == ["1.2", "1.6", "2"]
-    assert document["polyins"]["book_heights"]["0.5"]["excess"] == pytest.approx(2.5)
+    assert document["polyins"]["book_heights"]["1.5"]["excess"] == pytest.approx(2.5)
     assert document["polyins"]["length_mm"]["150"]["imu_fusion_over_single"] == pytest.approx(5.0 / 6.0)
-    assert set(document["polyins"]["wheels"]["test B"]) == {"as it is", *a5.WHEELS}
+    assert set(document["polyins"]["variants"]["test B"]) == {"as it is", *a5.VARIANTS}
 
 
 def test_what_is_swept_is_all_that_changes() -> None:
@@ -93,15 +121,27 @@ def test_what_is_swept_is_all_that_changes() -> None:
     # of the ruler alone; the module's mass at its tip makes it more
     assert stiff.rulers.rulers()[0].bending_rate > 2.0 * lawn.rulers.rulers()[0].bending_rate
     assert nonrigid.with_thickness(stiff, 1.0) == lawn
+    for change in a5.VARIANTS.values():
+        assert change(lawn) != lawn
+        assert change(lawn).model_copy(update={"road": lawn.road, "rulers": lawn.rulers}) == lawn
     for sweep in a5.SWEEPS.values():
         assert sweep.own in sweep.values
         scenario = nonrigid.scenario_of(sweep.test, quick=True)
         assert sweep.change(scenario, sweep.own) == scenario
 
 
+def test_what_diverges_beyond_all_numbers_has_no_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = {"enav-fusion": 2.0, "attitude shared": np.nan}
+    variants = {name: lambda _, error=error: np.array([error]) for name, error in errors.items()}
+    monkeypatch.setattr(a6, "VARIANTS", variants)
+    monkeypatch.setattr(nonrigid, "recording_of", lambda *_: None)
+    assert a6.table("test A", 2, True, Steps(None, 2)) == {"enav-fusion": 2.0, "attitude shared": None}
+
+
 def test_costs_of_sharing_are_relative_to_enav_fusion() -> None:
     costs = a6.with_costs(a6.PAPER["test A"])["cost"]
     assert costs == {"attitude and velocity shared": pytest.approx(0.552, abs=0.001)}
+    assert a6.with_costs({"enav-fusion": 2.0, "attitude shared": None})["cost"] == {"attitude shared": None}
     shares: list[float] = []
     Steps(shares.append, 2).next()(1.0)
     assert shares == [0.5]

@@ -18,7 +18,7 @@ def rough(correlation=0.5, sigma=0.4, seed=0, length=4000.0):
 
 
 def test_roughness_has_its_size_and_its_correlation():
-    heights = rough()
+    heights = rough(sigma=0.0)
     np.testing.assert_allclose(heights.std(axis=0), 2e-3, rtol=0.05)
     assert np.corrcoef(heights.T)[0, 1] == pytest.approx(0.5, abs=0.07)
     assert np.corrcoef(rough(correlation=1.0).T)[0, 1] == pytest.approx(1.0)
@@ -39,6 +39,8 @@ def test_patches_differ_in_roughness():
         return np.std(np.log(pieces.std(axis=1)))
 
     assert spread(0.8) > spread(0.4) > 1.2 * spread(0.0)
+    # the same in the median, more as a whole: exp(sigma^2)
+    assert rough(sigma=0.4).std() / rough(sigma=0.0).std() == pytest.approx(np.exp(0.16), rel=0.05)
 
 
 def test_a_book_lifts_the_wheels_of_its_side_only():

@@ -24,7 +24,9 @@ from polyins.simulation.scenario import Scenario
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
+OWN_RATES = "imu-fusion, own rates"
+"""as the paper's (13) has it: each force is moved to the origin by that IMU's own rate, not by the mean of all"""
+METHODS = ("imu-fusion", OWN_RATES, "nav-fusion", "enav-fusion")
 SEEDS = {"rigid": 10, "test A": 20, "test B": 20}
 QUICK_SEEDS = 1
 SWEPT = ("imu-fusion", "nav-fusion")
@@ -53,18 +55,20 @@ class Sweep:
 
 SWEEPS = {
     "roughness_mm": Sweep("test A", nonrigid.with_roughness, (1.2, 1.6, 2.0), 1.6, 20, "roughness of the lawn, mm rms"),
-    "book_heights": Sweep("test B", nonrigid.with_books, (0.5, 0.75, 1.0), 1.0, 5, "thickness of the books, share"),
+    "book_heights": Sweep("test B", nonrigid.with_books, (1.0, 1.5, 2.0), 1.0, 20, "thickness of the books, share"),
     "length_mm": Sweep("test B", nonrigid.with_lengths, (150.0, 200.0, 260.0), 200.0, 5, "books, mm long"),
     "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 5, "thickness of the rulers, mm"),
 }
 
-WHEELS: dict[str, dict[str, Any]] = {
-    "tyres only push": {"tyres_only_push": True},
-    "round wheel": {"wheel_radius_m": 0.125},
+VARIANTS: dict[str, Callable[[Scenario], Scenario]] = {
+    "tyres also pull": lambda scenario: nonrigid.with_road(scenario, tyres_only_push=False),
+    "round wheels": lambda scenario: nonrigid.with_road(scenario, wheel_radius_m=0.125),
+    "ends of a ruler alike": lambda scenario: nonrigid.with_rulers(scenario, tuning_spread=0.0),
+    "ground without patches": lambda scenario: nonrigid.with_road(scenario, patch_sigma=0.0),
 }
-"""what else the road may say of wheels; 0.2 to 0.3 m across is usual for such robots"""
-WHEEL_SEEDS = 5
-WHEEL_TESTS = ("test A", "test B")
+"""what else might be assumed; wheels of 0.2 to 0.3 m across are usual for such robots"""
+VARIANT_SEEDS = 5
+VARIED_TESTS = ("test A", "test B")
 
 Runs = list[dict[str, Array]]
 """by seed and method: the largest horizontal error in each outage, m; of `single` for every IMU"""
@@ -75,18 +79,18 @@ Document = dict[str, Any]
 def reproduce(
     quick: bool = False, progress: Callable[[float], None] | None = None, out: Path | None = None
 ) -> Document:
-    """Run the rigid array, test A, test B, the sweeps over the lawn, the books and the rulers, and other wheels.
+    """Run the rigid array, test A, test B, the sweeps over the lawn, the books and the rulers, and the variants.
 
     `quick` takes one seed, the first 330 s. `out` is the folder for the pictures.
     """
     seeds = dict.fromkeys(SEEDS, QUICK_SEEDS) if quick else SEEDS
     others = sum((QUICK_SEEDS if quick else sweep.seeds) * (len(sweep.values) - 1) for sweep in SWEEPS.values())
-    others += (QUICK_SEEDS if quick else WHEEL_SEEDS) * len(WHEELS) * len(WHEEL_TESTS)
+    others += (QUICK_SEEDS if quick else VARIANT_SEEDS) * len(VARIANTS) * len(VARIED_TESTS)
     steps = Steps(progress, sum(seeds.values()) + others)
     runs = {test: run(nonrigid.scenario_of(test, quick), count, steps) for test, count in seeds.items()}
     tables = {test: row(found) for test, found in runs.items()}
     sweeps = {name: run_sweep(sweep, runs[sweep.test], quick, steps) for name, sweep in SWEEPS.items()}
-    wheels = {test: run_wheels(test, runs[test], quick, steps) for test in WHEEL_TESTS}
+    variants = {test: run_variants(test, runs[test], quick, steps) for test in VARIED_TESTS}
     if out is not None:
         for name, sweep in SWEEPS.items():
             write_figure(sweep_figure(sweeps[name], sweep.title), out / f"a5-{name.partition('_')[0]}.html")
@@ -96,13 +100,13 @@ def reproduce(
         "polyins": {
             **{name: with_ratios(row, tables["rigid"]) for name, row in tables.items()},
             **sweeps,
-            "wheels": wheels,
+            "variants": variants,
         },
         "settings": {
             "seeds": {
                 **seeds,
                 **{name: QUICK_SEEDS if quick else sweep.seeds for name, sweep in SWEEPS.items()},
-                "wheels": QUICK_SEEDS if quick else WHEEL_SEEDS,
+                "variants": QUICK_SEEDS if quick else VARIANT_SEEDS,
             },
             "outages": {name: len(nonrigid.scenario_of(name, quick).outage_intervals()) for name in seeds},
             "scenarios": {name: nonrigid.scenario_of(name, quick).model_dump(mode="json") for name in seeds},
@@ -122,11 +126,11 @@ def run_sweep(sweep: Sweep, own: Runs, quick: bool, steps: Steps) -> Document:
     }
 
 
-def run_wheels(test: str, own: Runs, quick: bool, steps: Steps) -> Document:
-    """Return the figures of a test by kind of wheels; `own` are its runs as it is."""
+def run_variants(test: str, own: Runs, quick: bool, steps: Steps) -> Document:
+    """Return the figures of a test by what is assumed; `own` are its runs as it is."""
     scenario = nonrigid.scenario_of(test, quick)
-    seeds = QUICK_SEEDS if quick else WHEEL_SEEDS
-    others = {name: run(nonrigid.with_road(scenario, **kind), seeds, steps, SWEPT) for name, kind in WHEELS.items()}
+    seeds = QUICK_SEEDS if quick else VARIANT_SEEDS
+    others = {name: run(change(scenario), seeds, steps, SWEPT) for name, change in VARIANTS.items()}
     return {name: excess(runs, own[:seeds]) for name, runs in {"as it is": own[:seeds], **others}.items()}
 
 
@@ -150,9 +154,11 @@ def row(runs: Runs) -> dict[str, float]:
 
 def errors(recording: Recording, name: str) -> Array:
     """Return the largest horizontal error in each outage, m; of `single` for every IMU."""
-    if name != "single":
-        return maxima(recording, name)
-    return np.array([maxima(recording, name, imu=i) for i in range(len(recording.imus))])
+    if name == "single":
+        return np.array([maxima(recording, name, imu=i) for i in range(len(recording.imus))])
+    if name == OWN_RATES:
+        return maxima(nonrigid.with_forces_at_origin(recording), "imu-fusion")
+    return maxima(recording, name)
 
 
 def with_ratios(row: dict[str, float], rigid: dict[str, float]) -> Document:

@@ -7,7 +7,8 @@ origin, on the flexible array of test A and on the same array if it were rigid.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ PAPER = {"test A": {"nav-fusion": 3.12, "enav-fusion": 2.99, "attitude and veloc
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
+Row = Mapping[str, float | None]
 
 VARIANTS: dict[str, Callable[[Recording], Array]] = {
     "imu-fusion": lambda recording: maxima(recording, "imu-fusion"),
@@ -55,8 +57,8 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     }
 
 
-def table(test: str, seeds: int, quick: bool, steps: Steps) -> dict[str, float]:
-    """Return the rms over outages and seeds, m, by variant."""
+def table(test: str, seeds: int, quick: bool, steps: Steps) -> Row:
+    """Return the rms over outages and seeds, m, by variant; None: it diverged until no number was left."""
     scenario = nonrigid.scenario_of(test, quick)
 
     def run(number: int) -> dict[str, Array]:
@@ -67,10 +69,13 @@ def table(test: str, seeds: int, quick: bool, steps: Steps) -> dict[str, float]:
         return found
 
     found = in_order(run, range(seeds))
-    return nonrigid.pooled({name: [each[name] for each in found] for name in VARIANTS})
+    pooled = nonrigid.pooled({name: [each[name] for each in found] for name in VARIANTS})
+    return {name: error if math.isfinite(error) else None for name, error in pooled.items()}
 
 
-def with_costs(row: dict[str, float]) -> Document:
+def with_costs(row: Row) -> Document:
     """Return a row with what each kind of sharing adds to the error of eNav-Fusion, relative."""
-    shared = [name for name in row if name.endswith("shared")]
-    return {**row, "cost": {name: row[name] / row["enav-fusion"] - 1.0 for name in shared}}
+    unit = row["enav-fusion"]
+    assert unit is not None
+    shared = {name: error for name, error in row.items() if name.endswith("shared")}
+    return {**row, "cost": {name: None if error is None else error / unit - 1.0 for name, error in shared.items()}}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from importlib import resources
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.recording import Recording
+from polyins.recording import ImuStream, Recording
 from polyins.reproduce.rigid_array import rms
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Scenario, read_scenario
@@ -27,12 +28,17 @@ def scenario_of(test: str, quick: bool) -> Scenario:
     """Return the scenario of a test, of which `quick` takes the first part."""
     with resources.as_file(resources.files("polyins.reproduce") / FILES[test]) as file:
         scenario = read_scenario(file)
+    scenario = with_rulers(scenario, stiff=test == "rigid")
+    if not quick:
+        return scenario
+    outages = tuple(outage for outage in scenario.outage_intervals() if outage[1] <= QUICK_S)
+    return scenario.model_copy(update={"duration_s": QUICK_S, "outages": outages})
+
+
+def with_rulers(scenario: Scenario, **keys: Any) -> Scenario:
+    """Return the scenario with other keys of its rulers."""
     assert scenario.rulers is not None
-    update: dict[str, Any] = {"rulers": scenario.rulers.model_copy(update={"stiff": test == "rigid"})}
-    if quick:
-        outages = tuple(outage for outage in scenario.outage_intervals() if outage[1] <= QUICK_S)
-        update |= {"duration_s": QUICK_S, "outages": outages}
-    return scenario.model_copy(update=update)
+    return scenario.model_copy(update={"rulers": scenario.rulers.model_copy(update=keys)})
 
 
 def with_road(scenario: Scenario, **keys: Any) -> Scenario:
@@ -62,15 +68,33 @@ def with_lengths(scenario: Scenario, length_mm: float) -> Scenario:
 
 def with_thickness(scenario: Scenario, thickness_mm: float) -> Scenario:
     """Return the scenario with rulers of another thickness, mm: stiffness grows with its third power."""
-    assert scenario.rulers is not None
-    rulers = scenario.rulers.model_copy(update={"thickness_m": thickness_mm * 1e-3})
-    return scenario.model_copy(update={"rulers": rulers})
+    return with_rulers(scenario, thickness_m=thickness_mm * 1e-3)
 
 
 def recording_of(scenario: Scenario, number: int) -> Recording:
     """Return the recording of the seed of a number, counted from 0: another ground, other rulers, other errors."""
     seed = FIRST_SEED + number
     return record(true_run(scenario.model_copy(update={"seed": seed})), seed=seed).recording
+
+
+def with_forces_at_origin(recording: Recording) -> Recording:
+    """Return the recording with each IMU's force moved to the array origin by its own rate, paper A (13).
+
+    The method `imu-fusion` takes one rate for all, the mean; of the recording returned it makes the paper's IMU-Fusion.
+    The angular acceleration is between the middles of two intervals; the first interval has none.
+    """
+    pairs = list(zip(recording.imus, recording.rig.imus, strict=True))
+    streams = tuple(replace(stream, dvel=_moved(stream, -imu.position)) for stream, imu in pairs)
+    imus = tuple(replace(imu, position=np.zeros(3)) for _, imu in pairs)
+    return replace(recording, imus=streams, rig=replace(recording.rig, imus=imus))
+
+
+def _moved(stream: ImuStream, arm: Array) -> Array:
+    dt = np.diff(stream.time, prepend=2.0 * stream.time[0] - stream.time[1])[:, None]
+    rate = stream.dtheta / dt
+    acceleration = np.diff(rate, axis=0, prepend=rate[:1]) / (0.5 * (dt + np.vstack([dt[:1], dt[:-1]])))
+    moved = np.cross(rate, np.cross(rate, arm)) + np.cross(acceleration, arm)
+    return np.asarray(stream.dvel + moved * dt)
 
 
 def pooled(maxima: Mapping[str, Iterable[Array]]) -> dict[str, float]:

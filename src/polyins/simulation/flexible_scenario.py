@@ -61,6 +61,11 @@ class Arm(Section):
     free_length_m: Positive
     """from the clamp to the tip, m"""
 
+    @property
+    def side(self) -> float:
+        """1: it points to the right; -1: to the left."""
+        return -1.0 if self.tip_m[1] < 0.0 else 1.0
+
 
 class Rulers(Section):
     """IMUs at the tips of steel rulers."""
@@ -86,23 +91,25 @@ class Rulers(Section):
     damping_spread: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.3
     """by which share, at most, the damping of a ruler differs, drawn evenly"""
     tuning_spread: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.03
-    """by which share, at most, its natural frequencies do: clamps are not ideal"""
+    """by which share one end of each ruler, drawn, is tuned higher, the other lower: clamps are off the middle"""
     stiff: bool = False
     """the rulers neither bend nor twist: a rigid array of the same geometry"""
 
     def rulers(self, rng: np.random.Generator | None = None) -> list[Ruler]:
         """Return the rulers; without a generator as they are meant to be."""
-        drawn = rng.uniform(-1.0, 1.0, (2, len(self.arms))) if rng else np.zeros((2, len(self.arms)))
+        rulers = sorted({arm.tip_m[0] for arm in self.arms})
+        shift = dict(zip(rulers, rng.choice([-1.0, 1.0], len(rulers)) if rng else np.zeros(len(rulers)), strict=True))
+        drawn = rng.uniform(-1.0, 1.0, len(self.arms)) if rng else np.zeros(len(self.arms))
         return [
             Ruler(
                 self.beam(arm.free_length_m),
                 np.array(arm.tip_m),
-                float(np.sign(arm.tip_m[1]) or 1.0),
-                tuning=1.0 + self.tuning_spread * float(tuning),
+                arm.side,
+                tuning=1.0 + self.tuning_spread * arm.side * float(shift[arm.tip_m[0]]),
                 damping=self.damping * (1.0 + self.damping_spread * float(damping)),
                 stiff=self.stiff,
             )
-            for arm, tuning, damping in zip(self.arms, *drawn, strict=True)
+            for arm, damping in zip(self.arms, drawn, strict=True)
         ]
 
     def beam(self, length: float) -> Cantilever:
@@ -144,7 +151,7 @@ class Road(Section):
     patch_length_m: Positive = 4.0
     """over which the roughness keeps its size, m"""
     patch_sigma: NotNegative = 0.4
-    """std of the logarithm of that size"""
+    """std of the logarithm of that size, whose median is `roughness_mm`"""
     books: tuple[Book, ...] = ()
     """on every straight"""
     wheelbase_m: Positive = 0.45

@@ -29,7 +29,7 @@ class Roughness:
     """Random ground whose power spectral density falls with the second power of the wave number."""
 
     rms: float
-    """m"""
+    """of a patch of median size, m"""
     shortest: float
     """wavelength, m"""
     longest: float
@@ -132,11 +132,11 @@ def _rough(count: int, roughness: Roughness, rng: np.random.Generator) -> Array:
 
 
 def _patches(count: int, roughness: Roughness, rng: np.random.Generator) -> Array:
-    """Return the local size of the roughness, log-normal, of unit mean square, shape (count,)."""
+    """Return the local size of the roughness, log-normal with a median of one, shape (count,)."""
     from scipy.ndimage import gaussian_filter1d
 
     width = roughness.patch_length / STEP / 2.0
     smooth = gaussian_filter1d(rng.standard_normal(count), width, mode="wrap")
     # the filter's gain: the integral of a squared Gaussian
     smooth *= np.sqrt(2.0 * np.sqrt(np.pi) * width)
-    return np.asarray(np.exp(roughness.patch_sigma * smooth - roughness.patch_sigma**2))
+    return np.asarray(np.exp(roughness.patch_sigma * smooth))
