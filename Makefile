@@ -1,7 +1,7 @@
 VENV := .venv
 PYTHON ?= python3
 BIN := $(VENV)/bin
-PICTURES := a3-sources a5-roughness afig7-gyro split-imus
+PICTURES := a3-sources a5-book a5-roughness afig7-gyro split-imus
 
 .PHONY: demo test lint types bench live-flood reproduce pictures clean
 

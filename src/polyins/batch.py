@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,11 +64,16 @@ class Prepared:
     """of a rig with wheels"""
     rolling: Rolling | None
     joined: Joint | None
+    loop: Callable[..., None] = engine.run_epochs
 
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
+        self.loop(*self.arguments(first, last))
+
+    def arguments(self, first: int, last: int) -> tuple[Any, ...]:
+        """Return what `engine.run_epochs` is called with for these epochs."""
         fixes = self.inputs.fixes if len(self.inputs.fixes) else None
-        engine.run_epochs(
+        return (
             self.state,
             self.plan,
             self.inputs,

@@ -111,6 +111,8 @@ class Navigator:
         self._made = Made(__version__, rig, start, method, options, geodetic, imu, delay, wait, {}, None, [])
         rig, self.start, self.delay = rig.subset(self._taken), start.subset(self._taken), delay
         self._recording = Recording(rig, (), geodetic=geodetic, options=options)
+        self._count = len(start.imu_errors)
+        self._some = self._taken != list(range(self._count))
         self._place = {index: place for place, index in enumerate(self._taken)}
         self._modules = modules.choose(self.method, rig) if self.method.rolling else None
         self._order = slice(None) if self._modules is None else np.array(modules.lanes(self._modules)[1])
@@ -129,7 +131,7 @@ class Navigator:
         A sample that cannot be taken is counted in `counts`.
         """
         if imu is None:
-            self._all(time, np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64).reshape(-1, 6)[self._taken])
+            self._all(time, np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64).reshape(-1, 6))
             return
         values = np.empty(6)
         values[:3], values[3:] = dtheta, dvel
@@ -238,6 +240,10 @@ class Navigator:
             self.counts[why] = self.counts.get(why, 0) + 1
 
     def _all(self, time: float, values: Array) -> None:
+        if len(values) != self._count:
+            raise InputError(f"imu: increments of {len(values)} IMUs; expected those of {self._count}")
+        if self._some:
+            values = values[self._taken]
         if not _finite(time, values.ravel()):
             self._refuse(NOT_FINITE)
             return

@@ -102,7 +102,7 @@ def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pyte
     assert document["paper"]["test A"]["ratio_to_rigid_single"]["nav-fusion"] == pytest.approx(1.56, abs=0.005)
     assert document["paper"]["test B"]["ratio_to_rigid_single"]["imu-fusion"] == pytest.approx(1.16, abs=0.005)
     assert sorted(document["polyins"]["roughness_mm"]) == ["1.2", "1.6", "2"]
-    assert document["polyins"]["book_heights"]["1.5"]["excess"] == pytest.approx(2.5)
+    assert document["polyins"]["book_mm"]["15"]["excess"] == pytest.approx(2.5)
     assert document["polyins"]["length_mm"]["150"]["imu_fusion_over_single"] == pytest.approx(5.0 / 6.0)
     assert set(document["polyins"]["variants"]["test B"]) == {"as it is", *a5.VARIANTS}
 
@@ -111,10 +111,10 @@ def test_what_is_swept_is_all_that_changes() -> None:
     lawn, books = (nonrigid.scenario_of(test, quick=True) for test in ("test A", "test B"))
     assert lawn.rulers is not None
     assert books.road is not None
-    thin = nonrigid.with_books(books, 0.5)
-    assert thin.road is not None
-    assert [book.height_m for book in thin.road.books] == [0.5 * book.height_m for book in books.road.books]
-    assert nonrigid.with_books(thin, 2.0) == books
+    thick = nonrigid.with_books(books, 15.0)
+    assert thick.road is not None
+    assert [book.height_m for book in thick.road.books] == [2.0 * book.height_m for book in books.road.books]
+    assert nonrigid.with_books(thick, 7.5) == books
     assert nonrigid.with_lengths(nonrigid.with_lengths(books, 150.0), 200.0) == books
     stiff = nonrigid.with_thickness(lawn, 2.0)
     assert stiff.rulers is not None

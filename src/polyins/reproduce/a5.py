@@ -55,7 +55,7 @@ class Sweep:
 
 SWEEPS = {
     "roughness_mm": Sweep("test A", nonrigid.with_roughness, (1.2, 1.6, 2.0), 1.6, 20, "roughness of the lawn, mm rms"),
-    "book_heights": Sweep("test B", nonrigid.with_books, (1.0, 1.5, 2.0), 1.0, 20, "thickness of the books, share"),
+    "book_mm": Sweep("test B", nonrigid.with_books, (7.5, 11.25, 15.0), 7.5, 20, "thickest of the books, mm"),
     "length_mm": Sweep("test B", nonrigid.with_lengths, (150.0, 200.0, 260.0), 200.0, 5, "books, mm long"),
     "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 5, "thickness of the rulers, mm"),
 }

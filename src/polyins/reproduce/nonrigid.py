@@ -52,10 +52,11 @@ def with_roughness(scenario: Scenario, roughness_mm: float) -> Scenario:
     return with_road(scenario, roughness_mm=roughness_mm)
 
 
-def with_books(scenario: Scenario, share: float) -> Scenario:
-    """Return the scenario with books of a share of their thickness."""
+def with_books(scenario: Scenario, thickest_mm: float) -> Scenario:
+    """Return the scenario with books of another thickness, all by the same factor."""
     assert scenario.road is not None
-    books = (book.model_copy(update={"height_m": share * book.height_m}) for book in scenario.road.books)
+    factor = thickest_mm * 1e-3 / max(book.height_m for book in scenario.road.books)
+    books = (book.model_copy(update={"height_m": factor * book.height_m}) for book in scenario.road.books)
     return with_road(scenario, books=tuple(books))
 
 
