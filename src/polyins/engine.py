@@ -129,7 +129,6 @@ def propagate(
             fuse.mechanize_at_fused_state(w, groups[0], dt, ratio, near)
         else:
             strapdown.mechanize(w, dt, ratio, near)
-        strapdown.remember(w)
         if origin is not None and several:
             fuse.project_to_origin(w, dt)
             if b == 0:
@@ -416,7 +415,6 @@ def begin(state: State, plan: Plan, raw: Array, interval: float, origin: Array |
         else:
             earth.evaluate_plane(w, state.near[4])
         strapdown.compensate(w, 1.0, interval)
-        strapdown.remember(w)
     for s in range(state.members.shape[0]):
         fuse.fuse_measurements(state.blocks, state.members[s, 0], state.members[s, 1], state.groups[s], interval)
     gather_idle_lanes(state.blocks, state.members)

@@ -56,13 +56,15 @@ def test_a_long_flight_keeps_quaternions_normal() -> None:
 @given(st.integers(0, 2**32 - 1), st.floats(0.05, 1.0))
 def test_increments_are_corrected_for_bias_and_scale(seed: int, fraction: float) -> None:
     rng, dt, w = np.random.default_rng(seed), 0.005, block()
-    raw, errors = rng.standard_normal((8, 6)), 1e-2 * rng.standard_normal((8, 12))
+    raw, errors, before = rng.standard_normal((8, 6)), 1e-2 * rng.standard_normal((8, 12)), rng.standard_normal((8, 6))
     put(w, bank.RAW_DTHETA, raw)
+    put(w, bank.DTHETA, before)
     put(w, bank.ERRORS, errors)
     strapdown.update_sensitivity(w)
     strapdown.compensate(w, fraction, dt)
     expected = (fraction * raw - dt * errors[:, :6]) / (1.0 + errors[:, 6:])
     np.testing.assert_allclose(get(w, bank.DTHETA, 6), expected, rtol=1e-14, atol=1e-17)
+    np.testing.assert_array_equal(get(w, bank.PREVIOUS_DTHETA, 6), before)
 
 
 @pytest.mark.parametrize("latitude", [-1.2, 0.5328])
@@ -70,9 +72,9 @@ def test_an_imu_at_rest_stays_at_rest_on_the_turning_earth(latitude: float) -> N
     dt, start = 0.02, Rotation.random(8, random_state=np.random.default_rng(4))
     w = block(start, position=(latitude, 1.0, 120.0))
     rate = EARTH_RATE * np.array([np.cos(latitude), 0.0, -np.sin(latitude)])
-    put(w, bank.DTHETA, dt * start.inv().apply(rate))
-    put(w, bank.DVEL, -dt * start.inv().apply([0.0, 0.0, earth.gravity(latitude, 120.0)]))
-    strapdown.remember(w)
+    for turned, accelerated in ((bank.DTHETA, bank.DVEL), (bank.PREVIOUS_DTHETA, bank.PREVIOUS_DVEL)):
+        put(w, turned, dt * start.inv().apply(rate))
+        put(w, accelerated, -dt * start.inv().apply([0.0, 0.0, earth.gravity(latitude, 120.0)]))
     place = near(latitude)
     strapdown.evaluate_at_own_state(w)
     earth.evaluate(w, *place[1:4])
@@ -124,9 +126,10 @@ def coning_drift(ratio: float, seconds: float) -> float:
     put(w, bank.PREVIOUS_DTHETA, coning_increment(-CONING_DT, 0.0))
     count = round(seconds / CONING_DT)
     for k in range(count):
-        put(w, bank.DTHETA, coning_increment(k * CONING_DT, (k + 1) * CONING_DT))
+        increment = coning_increment(k * CONING_DT, (k + 1) * CONING_DT)
+        put(w, bank.DTHETA, increment)
         strapdown.mechanize(w, CONING_DT, ratio, NEAR_PLANE)
-        strapdown.remember(w)
+        put(w, bank.PREVIOUS_DTHETA, increment)
     away = coning_attitude(count * CONING_DT).inv() * attitudes(w)[0]
     return float(away.as_rotvec()[0] / seconds)
 

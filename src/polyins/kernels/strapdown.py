@@ -51,9 +51,11 @@ S = tuple(0.5 * (-1.0) ** k / math.factorial(2 * k + 1) for k in range(10))
 def compensate(w: Array, fraction: float, dt: float) -> None:
     """Correct the part `fraction` of the measured increments, which took `dt` seconds, for the estimated errors.
 
-    (increment - bias dt) / (1 + scale)
+    (increment - bias dt) / (1 + scale); the corrected ones that were there become the previous ones.
     """
     for i in range(3 * LANES):
+        w[PREVIOUS_DTHETA + i] = w[DTHETA + i]
+        w[PREVIOUS_DVEL + i] = w[DVEL + i]
         w[DTHETA + i] = (w[RAW_DTHETA + i] * fraction - w[ERRORS + i] * dt) * w[SENSITIVITY + i]
         w[DVEL + i] = (w[RAW_DVEL + i] * fraction - w[ERRORS + 3 * LANES + i] * dt) * w[SENSITIVITY + 3 * LANES + i]
 
@@ -63,14 +65,6 @@ def update_sensitivity(w: Array) -> None:
     """Write 1 / (1 + scale) after the errors have changed."""
     for i in range(6 * LANES):
         w[SENSITIVITY + i] = 1.0 / (1.0 + w[ERRORS + 6 * LANES + i])
-
-
-@kernel
-def remember(w: Array) -> None:
-    """Make the current increments the previous ones."""
-    for i in range(3 * LANES):
-        w[PREVIOUS_DTHETA + i] = w[DTHETA + i]
-        w[PREVIOUS_DVEL + i] = w[DVEL + i]
 
 
 @kernel
