@@ -27,6 +27,9 @@ RATE = click.FloatRange(0.0, 1e4, min_open=True)
 COLLECT_AFTER = 300_000
 """new objects before Python looks for garbage: a start imports nearly as many, and all of them stay"""
 
+TURN_S = 5e-4
+"""for which a thread keeps Python's lock while others wait, s: kernels want it often, each time for an instant only"""
+
 as_json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document and nothing else.")
 no_report_option = click.option("--no-report", is_flag=True, help="Leave out report.html.")
 
@@ -51,6 +54,7 @@ def main() -> None:
     """Run the command line; exit 0 if done, 1 if it failed while running, 2 if command line or input are wrong."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
+    sys.setswitchinterval(TURN_S)
     try:
         cli.main(arguments, prog_name="polyins", standalone_mode=False)
     except click.exceptions.Exit as exit_:
