@@ -56,18 +56,20 @@ class Sweep:
 SWEEPS = {
     "roughness_mm": Sweep("test A", nonrigid.with_roughness, (1.2, 1.6, 2.0), 1.6, 20, "roughness of the lawn, mm rms"),
     "book_mm": Sweep("test B", nonrigid.with_books, (7.5, 11.25, 15.0), 7.5, 20, "thickest of the books, mm"),
-    "length_mm": Sweep("test B", nonrigid.with_lengths, (150.0, 200.0, 260.0), 200.0, 5, "books, mm long"),
-    "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 5, "thickness of the rulers, mm"),
+    "length_mm": Sweep("test B", nonrigid.with_lengths, (150.0, 200.0, 260.0), 200.0, 20, "books, mm long"),
+    "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 20, "thickness of the rulers, mm"),
 }
 
 VARIANTS: dict[str, Callable[[Scenario], Scenario]] = {
     "tyres also pull": lambda scenario: nonrigid.with_road(scenario, tyres_only_push=False),
     "round wheels": lambda scenario: nonrigid.with_road(scenario, wheel_radius_m=0.125),
     "ends of a ruler alike": lambda scenario: nonrigid.with_rulers(scenario, tuning_spread=0.0),
+    "roughness of the whole ground": nonrigid.with_roughness_of_the_whole,
     "ground without patches": lambda scenario: nonrigid.with_road(scenario, patch_sigma=0.0),
+    "waves down to 0.05 m": lambda scenario: nonrigid.with_road(scenario, wavelengths_m=(0.05, 3.0)),
 }
 """what else might be assumed; wheels of 0.2 to 0.3 m across are usual for such robots"""
-VARIANT_SEEDS = 5
+VARIANT_SEEDS = 20
 VARIED_TESTS = ("test A", "test B")
 
 Runs = list[dict[str, Array]]

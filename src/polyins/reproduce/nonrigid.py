@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
@@ -50,6 +51,12 @@ def with_road(scenario: Scenario, **keys: Any) -> Scenario:
 def with_roughness(scenario: Scenario, roughness_mm: float) -> Scenario:
     """Return the scenario on ground of another roughness, rms in mm."""
     return with_road(scenario, roughness_mm=roughness_mm)
+
+
+def with_roughness_of_the_whole(scenario: Scenario) -> Scenario:
+    """Return the scenario on ground whose roughness is that of all of it, not that of a median patch."""
+    assert scenario.road is not None
+    return with_roughness(scenario, scenario.road.roughness_mm * math.exp(-(scenario.road.patch_sigma**2)))
 
 
 def with_books(scenario: Scenario, thickest_mm: float) -> Scenario:

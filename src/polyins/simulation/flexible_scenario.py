@@ -71,7 +71,7 @@ class Rulers(Section):
     """IMUs at the tips of steel rulers."""
 
     arms: Annotated[tuple[Arm, ...], Field(min_length=1)]
-    """one for each IMU"""
+    """one for each IMU; those equally far ahead are the two ends of one ruler"""
     width_m: Positive = 0.03
     """of the rulers, m"""
     thickness_m: Positive = 0.001
@@ -97,8 +97,8 @@ class Rulers(Section):
 
     def rulers(self, rng: np.random.Generator | None = None) -> list[Ruler]:
         """Return the rulers; without a generator as they are meant to be."""
-        rulers = sorted({arm.tip_m[0] for arm in self.arms})
-        shift = dict(zip(rulers, rng.choice([-1.0, 1.0], len(rulers)) if rng else np.zeros(len(rulers)), strict=True))
+        places = sorted({arm.tip_m[0] for arm in self.arms})
+        shift = dict(zip(places, rng.choice([-1.0, 1.0], len(places)) if rng else np.zeros(len(places)), strict=True))
         drawn = rng.uniform(-1.0, 1.0, len(self.arms)) if rng else np.zeros(len(self.arms))
         return [
             Ruler(
@@ -143,7 +143,7 @@ class Road(Section):
     """The ground, and the robot that rolls over it."""
 
     roughness_mm: NotNegative = 0.0
-    """rms height of the ground, mm"""
+    """rms height of the ground in a patch of median roughness, mm"""
     wavelengths_m: Pair = (0.1, 3.0)
     """the shortest and the longest, m"""
     correlation: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.5
