@@ -26,7 +26,6 @@ LOOPS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "rotate_at_own_state": (strapdown.rotate_at_own_state, (W,)),
     "evaluate": (earth.evaluate, (W, 0.0, 0.0, 1.0)),
     "advance": (strapdown.advance, (W, 0.01, NEAR)),
-    "evaluate_at_fused_state": (fuse.evaluate_at_fused_state, (W, G)),
     "project_to_origin": (fuse.project_to_origin, (W, 0.01)),
     "add_to_means": (fuse.add_to_means, (W, G)),
     "position_rows": (share._position_rows, (G, 0.01)),

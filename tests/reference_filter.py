@@ -246,13 +246,10 @@ def velocity_change(earth: Earth, position: Array, velocity: Array, dvel_n: Arra
     return force + (gravity - cross(2.0 * w_ie + w_en, velocity)) * dt
 
 
-def mechanize(
-    earth: Earth, own: State, common: State, previous: Increment, current: Increment, rescale_coning: bool
-) -> State:
+def mechanize(earth: Earth, own: State, previous: Increment, current: Increment, rescale_coning: bool) -> State:
     """Advance `own` by one interval: velocity, position, attitude.
 
-    `common` is the state at which C, rates, gravity and Coriolis are taken: `own` itself, except where an array shares
-    its mechanization. They are taken at the middle of the interval, reached by half a step with those of its start.
+    Rates, gravity and Coriolis are taken at the middle of the interval, reached by half a step with those of its start.
     """
     dt = current.dt
     factor = coning_factor(previous.dt, dt, rescale_coning)
@@ -260,11 +257,11 @@ def mechanize(
     rotation = 0.5 * first + SECOND_ORDER * cross(current.dtheta, first)
     sculling = factor * (cross(previous.dtheta, current.dvel) + cross(previous.dvel, current.dtheta))
     coning = factor * cross(previous.dtheta, current.dtheta)
-    dvel_n = common.C @ (current.dvel + rotation + sculling)
+    dvel_n = own.C @ (current.dvel + rotation + sculling)
 
-    half_change = 0.5 * velocity_change(earth, common.position, common.velocity, dvel_n, dt)
-    mid_velocity = common.velocity + half_change
-    mid_position = common.position + 0.5 * dt * mid_velocity / earth.metres_per_unit(common.position)
+    half_change = 0.5 * velocity_change(earth, own.position, own.velocity, dvel_n, dt)
+    mid_velocity = own.velocity + half_change
+    mid_position = own.position + 0.5 * dt * mid_velocity / earth.metres_per_unit(own.position)
 
     velocity = own.velocity + velocity_change(earth, mid_position, mid_velocity, dvel_n, dt)
     mean_velocity = 0.5 * (own.velocity + velocity)
@@ -495,7 +492,7 @@ class NavFusion(Bank):
             self.covariances[i] = predict(
                 self.earth, self.covariances[i], state, current.rate, current.force, current.dt, self.noise
             )
-            self.states[i] = mechanize(self.earth, state, state, self.previous[i], current, self.rescale_coning)
+            self.states[i] = mechanize(self.earth, state, self.previous[i], current, self.rescale_coning)
             self.previous[i] = current
 
     def position_designs(self) -> list[Array]:
@@ -517,21 +514,27 @@ class EnavFusion(Bank):
 
     share_mechanization: bool = False
 
-    def common(self, fused: State, i: int) -> State:
-        """The state at which IMU i's mechanization takes its intermediates."""
-        if not self.share_mechanization or len(self.states) == 1:
-            return self.states[i]
-        # The velocity of the IMU's own point: the opposite of its projection to the origin.
-        return replace(fused, velocity=move_velocity(self.earth, fused, self.mean_rate(), self.positions[i]))
+    def begin_at_fused_state(self, fused: State) -> None:
+        """Give all IMUs the fused attitude, and the fused velocity less what each seems to be off from it."""
+        seen = [
+            move_velocity(self.earth, s, inc.rate, -p)
+            for s, inc, p in zip(self.states, self.previous, self.positions, strict=True)
+        ]
+        self.states = [
+            replace(s, velocity=s.velocity + fused.velocity - at_origin, quaternion=fused.quaternion)
+            for s, at_origin in zip(self.states, seen, strict=True)
+        ]
 
     def propagate(self, raw: list[Increment]) -> None:
         fused = self.fused()
+        if self.share_mechanization and len(self.states) > 1:
+            self.begin_at_fused_state(fused)
         current = [compensate(inc, s.errors) for inc, s in zip(raw, self.states, strict=True)]
         rate = np.mean([inc.rate for inc in current], axis=0)
         force = np.mean([inc.force for inc in current], axis=0)
         self.covariances = [predict(self.earth, self.covariances[0], fused, rate, force, raw[0].dt, self.noise)]
         self.states = [
-            mechanize(self.earth, s, self.common(fused, i), self.previous[i], current[i], self.rescale_coning)
+            mechanize(self.earth, s, self.previous[i], current[i], self.rescale_coning)
             for i, s in enumerate(self.states)
         ]
         self.previous = current

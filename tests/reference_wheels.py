@@ -320,7 +320,7 @@ class WheelFilter:
         self.turned.append(np.array([increment.dtheta for increment in current]))
 
     def advance(self, state: WheelState, previous: Increment, current: Increment) -> WheelState:
-        moved = mechanize(self.earth, state, state, previous, current, True)
+        moved = mechanize(self.earth, state, previous, current, True)
         return WheelState(moved.position, moved.velocity, moved.quaternion, moved.errors, state.mounting)
 
     def forget(self, length: float) -> None:

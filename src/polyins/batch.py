@@ -65,6 +65,7 @@ class Prepared:
     rolling: Rolling | None
     joined: Joint | None
     loop: Callable[..., None] = engine.run_epochs
+    """or its code for these arrays, see `jit.compiled_for`"""
 
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""

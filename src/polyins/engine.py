@@ -126,9 +126,8 @@ def propagate(
             strapdown.remember_matrix(w)
         strapdown.compensate(w, fraction, dt)
         if shared_mechanization:
-            fuse.mechanize_at_fused_state(w, groups[0], dt, ratio, near)
-        else:
-            strapdown.mechanize(w, dt, ratio, near)
+            fuse.begin_at_fused_state(w, groups[0])
+        strapdown.mechanize(w, dt, ratio, near)
         if origin is not None and several:
             fuse.project_to_origin(w, dt)
             if b == 0:

@@ -111,8 +111,8 @@ class Navigator:
         self._made = Made(__version__, rig, start, method, options, geodetic, imu, delay, wait, {}, None, [])
         rig, self.start, self.delay = rig.subset(self._taken), start.subset(self._taken), delay
         self._recording = Recording(rig, (), geodetic=geodetic, options=options)
-        self._count = len(start.imu_errors)
-        self._some = self._taken != list(range(self._count))
+        self._imus = len(start.imu_errors)
+        self._takes_some = self._taken != list(range(self._imus))
         self._place = {index: place for place, index in enumerate(self._taken)}
         self._modules = modules.choose(self.method, rig) if self.method.rolling else None
         self._order = slice(None) if self._modules is None else np.array(modules.lanes(self._modules)[1])
@@ -128,7 +128,7 @@ class Navigator:
         """Take what IMU `imu` of the rig measured in the interval that ends at `time`, s: rad and m/s, shape (3,).
 
         In array axes: a rotated mount is the caller's. Without `imu`, samples of all IMUs with one stamp, shape (N, 3).
-        A sample that cannot be taken is counted in `counts`.
+        A sample that cannot be taken is counted in `counts`. Raises InputError for samples of another number of IMUs.
         """
         if imu is None:
             self._all(time, np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64).reshape(-1, 6))
@@ -240,9 +240,9 @@ class Navigator:
             self.counts[why] = self.counts.get(why, 0) + 1
 
     def _all(self, time: float, values: Array) -> None:
-        if len(values) != self._count:
-            raise InputError(f"imu: increments of {len(values)} IMUs; expected those of {self._count}")
-        if self._some:
+        if len(values) != self._imus:
+            raise InputError(f"imu: increments of {len(values)} IMUs; expected those of {self._imus}")
+        if self._takes_some:
             values = values[self._taken]
         if not _finite(time, values.ravel()):
             self._refuse(NOT_FINITE)

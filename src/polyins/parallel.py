@@ -52,7 +52,10 @@ def run_all(
 
 
 def in_order(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """Return what a function makes of each item, in their order, on all cores; errors are those of `run_all`."""
+    """Return what a function makes of each item, in their order, on all cores.
+
+    The error of what fails first is raised, once what runs has ended.
+    """
     return run_all([partial(_apply, function, item) for item in items])
 
 

@@ -16,7 +16,7 @@ from polyins import engine
 from polyins.aiding.rolling import Joint
 from polyins.batch import Prepared, build_outputs
 from polyins.engine import Inputs, Outputs, State
-from polyins.kernels.jit import bound
+from polyins.kernels.jit import compiled_for
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Timeline:
             size *= 2
         self._allocate(size, size, inputs.increments.shape[2])
         # the window's arrays come and go, their types do not
-        self.run = replace(self.run, loop=bound(self.run.loop, *self.run.arguments(1, 1)))
+        self.run = replace(self.run, loop=compiled_for(self.run.loop, *self.run.arguments(1, 1)))
         self.inputs.time[0] = inputs.time[0]
         self.inputs.increments[0] = inputs.increments[0]
         self._note(0)

@@ -108,7 +108,8 @@ def _interleaved(streams: Sequence[tuple[Array, Array]], epochs: int) -> Array:
         some = [streams[min(i, len(streams) - 1)] for i in range(first, first + TOGETHER)]
         for row, vectors in enumerate(zip(*some, strict=True)):
             # of one layout, for which the kernel is compiled once
-            interleave(tuple(map(np.ascontiguousarray, vectors)), first, 3 * row, increments)
+            alike = tuple(np.require(each, np.float64, ["C", "W"]) for each in vectors)
+            interleave(alike, first, 3 * row, increments)
     return increments
 
 

@@ -41,6 +41,7 @@ def test_feeding_attitude_and_velocity_back_is_nearly_imu_fusion(lawn: Recording
     for recording in (lawn, rigid):
         both = outage_maxima(recording, velocity=True, attitude=True)
         np.testing.assert_allclose(both, maxima(recording, "imu-fusion"), rtol=0.1)
+        np.testing.assert_allclose(both, maxima(recording, "enav-fusion-shared-mechanization"), rtol=1e-2)
 
 
 def test_flexing_troubles_imu_fusion_and_spares_nav_fusion(lawn: Recording, rigid: Recording) -> None:

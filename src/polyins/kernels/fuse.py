@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from polyins.kernels import bank, share, strapdown
+from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, formula, kernel
 
 Three = tuple[float, float, float]
-Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 
 @kernel
@@ -192,53 +191,20 @@ def quaternion_to_matrix(g: Array, q: int, c: int) -> None:
 
 
 @kernel
-def evaluate_at_fused_state(w: Array, g: Array) -> None:
-    """Let the fused state be where the earth is evaluated and what rotates the velocity increments into n.
+def begin_at_fused_state(w: Array, g: Array) -> None:
+    """Let the next interval of each IMU begin with the fused attitude, and with the fused velocity as seen from it.
 
-    Its velocity is projected to each IMU's point. One loop, since LLVM unrolls shorter ones before it could vectorize.
+    Its position and errors stay its own: simplification ii of paper A, VI.
     """
-    r0, r1, r2 = g[share.POSITION], g[share.POSITION + 1], g[share.POSITION + 2]
-    vn, ve, vd = g[share.VELOCITY], g[share.VELOCITY + 1], g[share.VELOCITY + 2]
-    c = _matrix(g)
-    n, e, d = _rotated(c, g[share.RATE], g[share.RATE + 1], g[share.RATE + 2])
-    for i in range(LANES):
-        lx, ly, lz = w[bank.TO_ORIGIN + i], w[bank.TO_ORIGIN + LANES + i], w[bank.TO_ORIGIN + 2 * LANES + i]
-        ln, le, ld = _rotated(c, lx, ly, lz)
-        rn = n - w[bank.EARTH_RATE + i]
-        rd = d - w[bank.EARTH_RATE + LANES + i]
-        w[bank.AT_VELOCITY + i] = vn - (e * ld - rd * le)
-        w[bank.AT_VELOCITY + LANES + i] = ve - (rd * ln - rn * ld)
-        w[bank.AT_VELOCITY + 2 * LANES + i] = vd - (rn * le - e * ln)
-        w[bank.AT_POSITION + i] = r0
-        w[bank.AT_POSITION + LANES + i] = r1
-        w[bank.AT_POSITION + 2 * LANES + i] = r2
-        fx, fy, fz = w[bank.DVEL_N + i], w[bank.DVEL_N + LANES + i], w[bank.DVEL_N + 2 * LANES + i]
-        fn, fe, fd = _rotated(c, fx, fy, fz)
-        w[bank.DVEL_N + i] = fn
-        w[bank.DVEL_N + LANES + i] = fe
-        w[bank.DVEL_N + 2 * LANES + i] = fd
-
-
-@kernel
-def mechanize_at_fused_state(w: Array, g: Array, dt: float, ratio: float, near: Array) -> None:
-    """Advance the eight IMUs of a block by `dt` seconds, all from the fused state: simplification ii of paper A, VI.
-
-    RATE is that of the last interval, with which the velocity came from the IMU to the origin.
-    """
-    strapdown.correct_coning_and_sculling(w, ratio)
-    evaluate_at_fused_state(w, g)
-    strapdown.advance(w, dt, near)
-
-
-@kernel
-def _matrix(g: Array) -> Nine:
-    c = share.MATRIX
-    return g[c], g[c + 1], g[c + 2], g[c + 3], g[c + 4], g[c + 5], g[c + 6], g[c + 7], g[c + 8]
-
-
-@formula
-def _rotated(c: Nine, x: float, y: float, z: float) -> Three:
-    return c[0] * x + c[1] * y + c[2] * z, c[3] * x + c[4] * y + c[5] * z, c[6] * x + c[7] * y + c[8] * z
+    for k in range(3):
+        for i in range(LANES):
+            w[bank.VELOCITY + k * LANES + i] += g[share.VELOCITY + k] - w[bank.ORIGIN_VELOCITY + k * LANES + i]
+    for k in range(4):
+        for i in range(LANES):
+            w[bank.QUATERNION + k * LANES + i] = g[share.QUATERNION + k]
+    for k in range(9):
+        for i in range(LANES):
+            w[bank.MATRIX + k * LANES + i] = g[share.MATRIX + k]
 
 
 @kernel

@@ -152,8 +152,8 @@ def entry(function: F) -> F:
     return _entry(function, _nrt=False)
 
 
-def bound(function: F, *arguments: Any) -> F:
-    """Return an entry compiled for arguments of these types, which the caller vouches for.
+def compiled_for(function: F, *arguments: Any) -> F:
+    """Return the code of an entry for arguments of these types. It checks none: others would be read wrongly.
 
     A call of the entry itself finds the types of its arguments anew: with many arrays that takes several microseconds.
     """

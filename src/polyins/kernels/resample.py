@@ -11,8 +11,6 @@ TOGETHER = 8
 """streams interleaved at once: their numbers fill a cache line"""
 BLOCK = 256
 """epochs of one axis at once: what they write stays in the cache until the other axes have had their turn"""
-Streams = tuple[Array, ...]
-"""eight of them"""
 
 
 @kernel
@@ -103,7 +101,7 @@ def covered_until(stamps: Array, first: Array, last: Array, before: Array, longe
 
 
 @entry
-def interleave(streams: Streams, first: int, row: int, out: Array) -> None:
+def interleave(streams: tuple[Array, ...], first: int, row: int, out: Array) -> None:
     """Write the vectors of eight streams, each (T, 3), side by side into `out` (T, 6, N) from stream `first` on.
 
     Their axes go into rows `row` ... `row` + 2. Streams beyond N are not written.

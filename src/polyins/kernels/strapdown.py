@@ -51,7 +51,8 @@ S = tuple(0.5 * (-1.0) ** k / math.factorial(2 * k + 1) for k in range(10))
 def compensate(w: Array, fraction: float, dt: float) -> None:
     """Correct the part `fraction` of the measured increments, which took `dt` seconds, for the estimated errors.
 
-    (increment - bias dt) / (1 + scale); the corrected ones that were there become the previous ones.
+    (increment - bias dt) / (1 + scale); the corrected ones that were there become the previous ones,
+    which spares a pass of its own.
     """
     for i in range(3 * LANES):
         w[PREVIOUS_DTHETA + i] = w[DTHETA + i]
@@ -84,7 +85,7 @@ def evaluate_at_own_state(w: Array) -> None:
 
 @kernel
 def correct_coning_and_sculling(w: Array, ratio: float) -> None:
-    """Write the rotation vector, and the velocity increment with rotation and sculling terms (over DVEL).
+    """Write the rotation vector, and into DVEL_N the velocity increment with rotation and sculling terms.
 
     The rotation's second order counts where an IMU turns with a wheel: 0.2 rad per interval make 0.7 % of the force.
 

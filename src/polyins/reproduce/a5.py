@@ -98,9 +98,9 @@ def reproduce(
             write_figure(sweep_figure(sweeps[name], sweep.title), out / f"a5-{name.partition('_')[0]}.html")
     return {
         "target": "a5",
-        "paper": {name: {**row, "ratio_to_rigid_single": _ratios(PAPER["rigid"], row)} for name, row in PAPER.items()},
+        "paper": {test: {**own, "ratio_to_rigid_single": _ratios(PAPER["rigid"], own)} for test, own in PAPER.items()},
         "polyins": {
-            **{name: with_ratios(row, tables["rigid"]) for name, row in tables.items()},
+            **{test: with_ratios(own, tables["rigid"]) for test, own in tables.items()},
             **sweeps,
             "variants": variants,
         },
@@ -163,15 +163,15 @@ def errors(recording: Recording, name: str) -> Array:
     return maxima(recording, name)
 
 
-def with_ratios(row: dict[str, float], rigid: dict[str, float]) -> Document:
-    """Return a row with its ratios, and those of the methods to each other."""
+def with_ratios(metres: dict[str, float], rigid: dict[str, float]) -> Document:
+    """Return the errors by method with their ratios, and those of the methods to each other."""
     return {
-        **row,
-        "ratio": _ratios(row, row),
-        "ratio_to_rigid_single": _ratios(rigid, row),
-        "imu_fusion_over_single": row["imu-fusion"] / row["single"],
-        "imu_fusion_over_nav_fusion": row["imu-fusion"] / row["nav-fusion"],
-        "enav_fusion_over_nav_fusion": row["enav-fusion"] / row["nav-fusion"],
+        **metres,
+        "ratio": _ratios(metres, metres),
+        "ratio_to_rigid_single": _ratios(rigid, metres),
+        "imu_fusion_over_single": metres["imu-fusion"] / metres["single"],
+        "imu_fusion_over_nav_fusion": metres["imu-fusion"] / metres["nav-fusion"],
+        "enav_fusion_over_nav_fusion": metres["enav-fusion"] / metres["nav-fusion"],
     }
 
 
@@ -195,5 +195,5 @@ def sweep_figure(sweep: Mapping[str, Mapping[str, float]], title: str) -> Figure
     return lines({name: (values, [row[name] for row in sweep.values()]) for name in SWEPT}, title, "outage error, m")
 
 
-def _ratios(unit: dict[str, float], row: dict[str, float]) -> dict[str, float]:
-    return {name: unit["single"] / value for name, value in row.items() if name != "single"}
+def _ratios(unit: dict[str, float], metres: dict[str, float]) -> dict[str, float]:
+    return {name: unit["single"] / value for name, value in metres.items() if name != "single"}

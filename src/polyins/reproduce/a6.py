@@ -1,8 +1,8 @@
 """Paper A, Table VI: what IMUs may share. Sharing the covariance costs nothing; sharing the mechanization does.
 
 Simplification i is eNav-Fusion. For simplification ii the paper feeds the fused state back into the mechanization of
-each IMU; it does not say which part. Here velocity, attitude, and both are fed back (`feedback`), as seen at the array
-origin, on the flexible array of test A and on the same array if it were rigid.
+each IMU; it does not say which part. Here velocity and attitude are fed back by themselves (`feedback`), and both by
+the method `enav-fusion-shared-mechanization`, on the flexible array of test A and on the same array if it were rigid.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ VARIANTS: dict[str, Callable[[Recording], Array]] = {
     "enav-fusion": lambda recording: maxima(recording, "enav-fusion"),
     "velocity shared": lambda recording: outage_maxima(recording, velocity=True, attitude=False),
     "attitude shared": lambda recording: outage_maxima(recording, velocity=False, attitude=True),
-    "attitude and velocity shared": lambda recording: outage_maxima(recording, velocity=True, attitude=True),
+    "attitude and velocity shared": lambda recording: maxima(recording, "enav-fusion-shared-mechanization"),
 }
 
 

@@ -198,6 +198,7 @@ def _sense(
         shared=shared,
         vibration=scenario.errors.vibration(run.path.speed(time)),
     )
+    # row by row, as recordings are read
     dtheta, dvel = (np.ascontiguousarray(product(imu.rotation, vectors)) for vectors in (dtheta, dvel))
     stream = ImuStream(imu.name, time, dtheta, dvel)
     return _calibrated(imu, scenario, errors), stream, errors
