@@ -181,3 +181,10 @@ def test_another_file_is_no_checkpoint(tmp_path: Path) -> None:
         Navigator.resume(path)
     with pytest.raises(InputError, match="is no checkpoint"):
         Navigator.resume(tmp_path / "nothing")
+
+
+def test_samples_of_another_number_of_imus_are_refused() -> None:
+    recording = shaken_recording(3, 4.0)
+    navigator = Navigator(recording.rig, batch.prepare(recording, "enav-fusion").start)
+    with pytest.raises(InputError, match="of 2 IMUs; expected those of 3"):
+        navigator.imu(0.01, np.zeros((2, 3)), np.zeros((2, 3)))

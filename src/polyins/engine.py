@@ -126,7 +126,9 @@ def propagate(
             strapdown.remember_matrix(w)
         strapdown.compensate(w, fraction, dt)
         if shared_mechanization:
-            fuse.begin_at_fused_state(w, groups[0])
+            # simplification ii of paper A, VI: position and errors stay each IMU's own
+            fuse.take_fused_velocity(w, groups[0])
+            fuse.take_fused_attitude(w, groups[0])
         strapdown.mechanize(w, dt, ratio, near)
         if origin is not None and several:
             fuse.project_to_origin(w, dt)

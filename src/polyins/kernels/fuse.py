@@ -191,14 +191,16 @@ def quaternion_to_matrix(g: Array, q: int, c: int) -> None:
 
 
 @kernel
-def begin_at_fused_state(w: Array, g: Array) -> None:
-    """Let the next interval of each IMU begin with the fused attitude, and with the fused velocity as seen from it.
-
-    Its position and errors stay its own: simplification ii of paper A, VI.
-    """
+def take_fused_velocity(w: Array, g: Array) -> None:
+    """Give each IMU of a block the fused velocity, as seen from where it is."""
     for k in range(3):
         for i in range(LANES):
             w[bank.VELOCITY + k * LANES + i] += g[share.VELOCITY + k] - w[bank.ORIGIN_VELOCITY + k * LANES + i]
+
+
+@kernel
+def take_fused_attitude(w: Array, g: Array) -> None:
+    """Give each IMU of a block the fused attitude."""
     for k in range(4):
         for i in range(LANES):
             w[bank.QUATERNION + k * LANES + i] = g[share.QUATERNION + k]

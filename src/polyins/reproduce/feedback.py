@@ -13,8 +13,7 @@ from polyins import batch, engine
 from polyins.engine import Inputs, Outputs, Plan, State
 from polyins.evaluation.outages import Interval
 from polyins.geodesy import metres_per_unit
-from polyins.kernels import bank, share, strapdown
-from polyins.kernels.bank import LANES
+from polyins.kernels import fuse
 from polyins.kernels.jit import Array, kernel
 from polyins.recording import Recording
 
@@ -55,21 +54,6 @@ def run_with_feedback(
         engine.run_epochs(state, plan, inputs, outputs, k, k + 1, fixes, None, origin, None, None)
         for b in range(state.blocks.shape[0]):
             if velocity:
-                _feed_back_velocity(state.blocks[b], state.groups[0])
+                fuse.take_fused_velocity(state.blocks[b], state.groups[0])
             if attitude:
-                _feed_back_attitude(state.blocks[b], state.groups[0])
-
-
-@kernel
-def _feed_back_velocity(w: Array, g: Array) -> None:
-    for k in range(3):
-        for i in range(LANES):
-            w[bank.VELOCITY + k * LANES + i] += g[share.VELOCITY + k] - w[bank.ORIGIN_VELOCITY + k * LANES + i]
-
-
-@kernel
-def _feed_back_attitude(w: Array, g: Array) -> None:
-    for k in range(4):
-        for i in range(LANES):
-            w[bank.QUATERNION + k * LANES + i] = g[share.QUATERNION + k]
-    strapdown.update_matrix(w)
+                fuse.take_fused_attitude(state.blocks[b], state.groups[0])
