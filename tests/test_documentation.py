@@ -38,6 +38,7 @@ from polyins.config import columns
 from polyins.io.yaml_document import read_yaml
 from polyins.recording import GnssStream, ImuStream, Reference
 from polyins.simulation import error_scenario, flexible_scenario, scenario
+from polyins.simulation.replay_scenario import Replay
 from polyins.simulation.wheel_scenario import Slip, Track, WheelModule
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -444,6 +445,7 @@ SCENARIO: dict[str, type[BaseModel]] = {
     "wheels[]": WheelModule,
     "wheels[].slip": Slip,
     "track": Track,
+    "replay": Replay,
 }
 KINDS = (
     (config.Outages, "mapping or list of two numbers each"),

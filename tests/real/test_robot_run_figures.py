@@ -9,7 +9,7 @@ from polyins.reproduce import b6, b7
 from polyins.reproduce.robot import FEW, score, score_all, solve, table
 from polyins.reproduce.robot_experiments import EXPERIMENTS
 from polyins.reproduce.sites import Site
-from polyins.simulation.vehicles import ROBOT
+from polyins.reproduce.vehicles import ROBOT
 
 
 @pytest.fixture(scope="module")

@@ -105,7 +105,10 @@ def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pyte
     assert sorted(document["polyins"]["roughness_mm"]) == ["1.2", "1.6", "2"]
     assert document["polyins"]["book_mm"]["15"]["excess"] == pytest.approx(2.5)
     assert document["polyins"]["length_mm"]["150"]["imu_fusion_over_single"] == pytest.approx(5.0 / 6.0)
-    assert set(document["polyins"]["variants"]["test B"]) == {"as it is", *a5.VARIANTS}
+    variants = document["polyins"]["variants"]
+    assert set(variants["test B"]) == set(a5.VARIANTS)
+    assert "books the other way round" not in variants["test A"]
+    assert variants["test A"]["round wheels"]["as_it_is"]["imu_fusion_over_nav_fusion"] == pytest.approx(2.0)
 
 
 def test_what_is_swept_is_all_that_changes() -> None:
@@ -122,13 +125,32 @@ def test_what_is_swept_is_all_that_changes() -> None:
     # of the ruler alone; the module's mass at its tip makes it more
     assert stiff.rulers.rulers()[0].bending_rate > 2.0 * lawn.rulers.rulers()[0].bending_rate
     assert nonrigid.with_thickness(stiff, 1.0) == lawn
-    for change in a5.VARIANTS.values():
-        assert change(lawn) != lawn
-        assert change(lawn).model_copy(update={"road": lawn.road, "rulers": lawn.rulers}) == lawn
+    for variant in a5.VARIANTS.values():
+        for test in variant.tests:
+            own = nonrigid.scenario_of(test, quick=True)
+            other = variant.change(own)
+            assert other != own
+            assert other.model_copy(update={"road": own.road, "rulers": own.rulers}) == own
     for sweep in a5.SWEEPS.values():
         assert sweep.own in sweep.values
         scenario = nonrigid.scenario_of(sweep.test, quick=True)
         assert sweep.change(scenario, sweep.own) == scenario
+
+
+def test_books_are_laid_in_another_order_and_stay_the_same_books() -> None:
+    books = nonrigid.scenario_of("test B", quick=True).road
+    assert books is not None
+    back = nonrigid.with_books_reversed(nonrigid.scenario_of("test B", quick=True)).road
+    rising = nonrigid.with_books_in_order(nonrigid.scenario_of("test B", quick=True)).road
+    assert back is not None
+    assert rising is not None
+    assert [(book.height_m, book.under) for book in back.books] == [
+        (book.height_m, book.under) for book in books.books[::-1]
+    ]
+    assert [book.height_m for book in rising.books] == sorted(book.height_m for book in books.books)
+    assert [book.under for book in rising.books].count("right") == 2
+    for laid in (back, rising):
+        assert [book.at_m for book in laid.books] == [book.at_m for book in books.books]
 
 
 def test_what_diverges_beyond_all_numbers_has_no_figure(monkeypatch: pytest.MonkeyPatch) -> None:

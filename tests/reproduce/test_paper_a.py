@@ -134,7 +134,7 @@ def test_what_is_shared_bounds_the_gain() -> None:
 
 
 def test_six_filters_differ_little_once_a_fix_has_come() -> None:
-    time, std = afig3.six_filters()
+    time, std = afig3.six_filters("test A")
     assert std.shape == (6, len(time), 3)
     figures = afig3.around_first_fix(time, std)
     assert 0.12 < figures["before_fix_m"][0] <= figures["before_fix_m"][1] < 0.21

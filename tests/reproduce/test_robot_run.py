@@ -15,9 +15,9 @@ from polyins.recording import Reference
 from polyins.reproduce import b6, b7, robot_experiments
 from polyins.reproduce.robot import CONFIGURATIONS, FEW, Score, as_in_the_paper, at_the_reference, by_seed, score, table
 from polyins.reproduce.sites import site
+from polyins.reproduce.vehicles import ROBOT
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario
-from polyins.simulation.vehicles import ROBOT
 
 RUNS = {"wheel-ins": 8, "dual-wheel-ins": 16, "body-wheel-ins": 16, "triple-ins": 16}
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from polyins.reproduce.vehicles import CAR, ROBOT
 from polyins.simulation.laps import Laps
 from polyins.simulation.plane import Plane
 from polyins.simulation.run import true_run
-from polyins.simulation.vehicles import CAR, ROBOT
 
 LAPS = Laps(length_m=40.0, width_m=20.0, corner_m=4.0, count=3, speed_m_s=1.5, change_m_s=0.5)
 
@@ -52,7 +52,7 @@ def test_stand_ins_are_drivable(vehicle):
     assert np.abs(path.speed(time, 1)).max() < 1.0
     assert np.abs(speed * path.heading(time, 1)).max() < 3.0
     # below what an ICM-20602 measures at 2000 deg/s
-    assert speed.max() / vehicle.wheel_radius_m < np.radians(2000.0)
+    assert speed.max() / scenario.wheels[0].radius_m < np.radians(2000.0)
 
 
 def test_a_run_takes_the_path_that_it_is_given_up_to_its_duration():

@@ -11,6 +11,7 @@ from polyins.geodesy import displacement
 from polyins.rig import DEG
 from polyins.simulation.path import Path, drive
 from polyins.simulation.replay import HELD_BELOW, replay
+from polyins.simulation.scenario import read_scenario, simulate
 
 Array = NDArray[np.float64]
 
@@ -125,3 +126,52 @@ def test_the_real_track(data_folder: FilePath) -> None:
     time = np.arange(0.0, path.duration, 0.1)
     assert np.abs(path.speed(time, 1)).max() < 4.0
     assert np.abs(path.speed(time) * path.heading(time, 1)).max() < 4.0
+
+
+def replay_file(folder: FilePath, fixes: tuple[Array, Array, Array], text: str = "") -> FilePath:
+    time, position, _ = fixes
+    table = np.column_stack([time, position[:, :2] / DEG, position[:, 2]])
+    header = "time_s,latitude_deg,longitude_deg,height_m"
+    np.savetxt(folder / "rtk.csv", table, delimiter=",", header=header, comments="", fmt="%.12f")
+    (folder / "scenario.yaml").write_text(f"rate_hz: 50\nimus: {{count: 1}}\nreplay: {{file: rtk.csv}}\n{text}")
+    return folder / "scenario.yaml"
+
+
+def test_a_scenario_drives_again_what_was_surveyed(
+    tmp_path: FilePath, original: Path, fixes: tuple[Array, Array, Array]
+) -> None:
+    recording = simulate(replay_file(tmp_path, fixes))
+    assert recording.reference is not None
+    time, reference = recording.reference.time, recording.reference.position
+    assert time[-1] == pytest.approx(240.0, abs=0.2)
+    origin = original.position(np.zeros(1))[0]
+    apart = displacement(reference, origin, True) - displacement(original.position(time), origin, True)
+    assert np.abs(apart).max() < 1.5
+    standing = recording.start.static_interval
+    assert standing is not None
+    assert 26.0 <= standing[1] <= 31.0
+    # the way is the file's; what the road and the springs add is drawn
+    other = simulate(replay_file(tmp_path, fixes, "seed: 1\n"))
+    assert other.reference is not None
+    assert other.reference.attitude is not None
+    assert recording.reference.attitude is not None
+    np.testing.assert_allclose(other.reference.position, reference, rtol=0.0, atol=1e-3)
+    assert np.abs(other.reference.attitude[:, 0] - recording.reference.attitude[:, 0]).max() > 0.2 * DEG
+
+
+def test_a_scenario_refuses_what_cannot_be_driven_again(tmp_path: FilePath, fixes: tuple[Array, Array, Array]) -> None:
+    for text, message in {
+        "shuttle: {}": "shuttle: is given with a replay",
+        "earth: plane": "replay: has latitudes and longitudes; expected earth: turning",
+        "wheels: [{name: left, position_m: [0, -1, 0]}]": "replay: is of a body that leans; with wheels",
+    }.items():
+        with pytest.raises(InputError, match=message):
+            read_scenario(replay_file(tmp_path, fixes, text))
+    scenario = replay_file(tmp_path, fixes)
+    lines = (tmp_path / "rtk.csv").read_text().splitlines()
+    (tmp_path / "rtk.csv").write_text("\n".join([*lines[:5], "1004,,114.0,35.0", *lines[6:]]))
+    with pytest.raises(InputError, match="none of them missing"):
+        simulate(scenario)
+    (tmp_path / "rtk.csv").write_text("time_s,lat\n0,1\n")
+    with pytest.raises(InputError, match=r"rtk\.csv: .*latitude_deg"):
+        simulate(scenario)

@@ -5,10 +5,10 @@ import pytest
 
 from polyins.errors import InputError
 from polyins.loading import load
+from polyins.reproduce.vehicles import ROBOT
 from polyins.simulation.files import write
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario, read_scenario, simulate, simulate_with_truth
-from polyins.simulation.vehicles import ROBOT
 from polyins.simulation.wheel_scenario import Slip, Track, WheelModule
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "robot.yaml"
@@ -184,6 +184,25 @@ def test_a_track_s_files_count_from_the_scenario_s(tmp_path, names):
     end = [10.0 * np.sin(4.0), 10.0 - 10.0 * np.cos(4.0)]
     np.testing.assert_allclose(recording.reference.position[-1, :2], end, atol=0.1)
     assert recording.imus[0].time[-1] == pytest.approx(10.0 + 39.5 + 3.0 + 5.0, abs=1.0)
+
+
+def test_ground_goes_up_and_down_where_it_is_asked_to_and_does_not_twist(tmp_path):
+    scenario = track_files(tmp_path)
+    level = simulate(scenario).reference
+    text = scenario.read_text().replace("odometer.csv}", "odometer.csv, slope_deg: 2, slope_length_m: 25}")
+    scenario.write_text(text + "wheels: [{name: left, position_m: [0, -0.2, 0], chips: 1}]\n")
+    run = true_run(read_scenario(scenario))
+    time = np.arange(0.0, run.path.duration, 0.1)
+    motion = run.path.motion(time)
+    assert not level.attitude[:, :2].any()
+    assert 0.5 < np.degrees(np.abs(motion.attitude[:, 1]).max()) < 2.0
+    assert np.degrees(np.ptp(motion.attitude[:, 0])) > 0.5
+    np.testing.assert_allclose((motion.angular_rate - motion.earth_rate)[:, 0], 0.0, atol=1e-6)
+    np.testing.assert_allclose(run.path.heading(time), simulate_heading(tmp_path, time), atol=1e-9)
+
+
+def simulate_heading(folder, time):
+    return true_run(read_scenario(track_files(folder))).path.heading(time)
 
 
 def test_a_track_without_its_columns_is_refused(tmp_path):

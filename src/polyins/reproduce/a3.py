@@ -266,7 +266,11 @@ def size_for(figure: float, sources: Mapping[str, Mapping[str, float]], at_most:
 
 
 def sources_figure(sources: Mapping[str, Mapping[str, float]], imus: int) -> Any:
-    """Return the stacked picture of what is left of sqrt(N) with each source added, and what all so far have taken."""
+    """Return the stacked picture of what each source takes of sqrt(N) on top of those before it."""
     ideal = float(np.sqrt(imus))
-    columns = {name: {"left": row["ratio"], "taken so far": ideal - row["ratio"]} for name, row in sources.items()}
+    columns = {
+        name: {"left": row["ratio"], "taken by this source": row["costs"],
+               "by those before it": ideal - row["ratio"] - row["costs"]}
+        for name, row in sources.items()
+    }  # fmt: skip
     return bars(columns, f"single / array, of sqrt({imus}) = {ideal:.2f}", "stack")

@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 OWN_RATES = "imu-fusion, own rates"
 """as the paper's (13) has it: each force is moved to the origin by that IMU's own rate, not by the mean of all"""
 METHODS = ("imu-fusion", OWN_RATES, "nav-fusion", "enav-fusion")
-SEEDS = {"rigid": 10, "test A": 20, "test B": 20}
+SEEDS = {"rigid": 10, "test A": 60, "test B": 60}
 QUICK_SEEDS = 1
+BLOCK = 20
+"""seeds"""
 SWEPT = ("imu-fusion", "nav-fusion")
 """one IMU errs much the same whatever is varied"""
 
@@ -57,20 +59,43 @@ SWEEPS = {
     "roughness_mm": Sweep("test A", nonrigid.with_roughness, (1.2, 1.6, 2.0), 1.6, 20, "roughness of the lawn, mm rms"),
     "book_mm": Sweep("test B", nonrigid.with_books, (7.5, 11.25, 15.0), 7.5, 20, "thickest of the books, mm"),
     "length_mm": Sweep("test B", nonrigid.with_lengths, (150.0, 200.0, 260.0), 200.0, 20, "books, mm long"),
-    "thickness_mm": Sweep("test A", nonrigid.with_thickness, (1.0, 1.5, 2.0), 1.0, 20, "thickness of the rulers, mm"),
+    "thickness_mm": Sweep(
+        "test A", nonrigid.with_thickness, (0.8, 1.0, 1.2, 1.5, 2.0), 1.0, 20, "thickness of the rulers, mm"
+    ),
 }
 
-VARIANTS: dict[str, Callable[[Scenario], Scenario]] = {
-    "tyres also pull": lambda scenario: nonrigid.with_road(scenario, tyres_only_push=False),
-    "round wheels": lambda scenario: nonrigid.with_road(scenario, wheel_radius_m=0.125),
-    "ends of a ruler alike": lambda scenario: nonrigid.with_rulers(scenario, tuning_spread=0.0),
-    "roughness of the whole ground": nonrigid.with_roughness_of_the_whole,
-    "ground without patches": lambda scenario: nonrigid.with_road(scenario, patch_sigma=0.0),
-    "waves down to 0.05 m": lambda scenario: nonrigid.with_road(scenario, wavelengths_m=(0.05, 3.0)),
+BOTH = ("test A", "test B")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Something that no source decides, assumed otherwise than in the scenario."""
+
+    change: Callable[[Scenario], Scenario]
+    tests: tuple[str, ...] = BOTH
+    seeds: int = 20
+
+
+def _pulling(scenario: Scenario) -> Scenario:
+    return nonrigid.with_road(scenario, tyres_only_push=False)
+
+
+VARIANTS = {
+    "tyres also pull": Variant(_pulling),
+    # wheels of 0.2 to 0.3 m across are usual for such robots
+    "round wheels": Variant(lambda scenario: nonrigid.with_road(scenario, wheel_radius_m=0.125)),
+    "ends of a ruler alike": Variant(lambda scenario: nonrigid.with_rulers(scenario, tuning_spread=0.0)),
+    "roughness of the whole ground": Variant(nonrigid.with_roughness_of_the_whole),
+    "ground without patches": Variant(lambda scenario: nonrigid.with_road(scenario, patch_sigma=0.0)),
+    "waves down to 0.05 m": Variant(lambda scenario: nonrigid.with_road(scenario, wavelengths_m=(0.05, 3.0))),
+    "books the other way round": Variant(nonrigid.with_books_reversed, ("test B",)),
+    "books twice as thick, tyres also pull": Variant(
+        lambda scenario: _pulling(nonrigid.with_books(scenario, 15.0)), ("test B",)
+    ),
+    "the same, thinnest book first, two under the right wheels": Variant(
+        lambda scenario: _pulling(nonrigid.with_books_in_order(nonrigid.with_books(scenario, 15.0))), ("test B",), 60
+    ),
 }
-"""what else might be assumed; wheels of 0.2 to 0.3 m across are usual for such robots"""
-VARIANT_SEEDS = 20
-VARIED_TESTS = ("test A", "test B")
 
 Runs = list[dict[str, Array]]
 """by seed and method: the largest horizontal error in each outage, m; of `single` for every IMU"""
@@ -87,12 +112,12 @@ def reproduce(
     """
     seeds = dict.fromkeys(SEEDS, QUICK_SEEDS) if quick else SEEDS
     others = sum((QUICK_SEEDS if quick else sweep.seeds) * (len(sweep.values) - 1) for sweep in SWEEPS.values())
-    others += (QUICK_SEEDS if quick else VARIANT_SEEDS) * len(VARIANTS) * len(VARIED_TESTS)
+    others += sum((QUICK_SEEDS if quick else each.seeds) * len(each.tests) for each in VARIANTS.values())
     steps = Steps(progress, sum(seeds.values()) + others)
     runs = {test: run(nonrigid.scenario_of(test, quick), count, steps) for test, count in seeds.items()}
     tables = {test: row(found) for test, found in runs.items()}
     sweeps = {name: run_sweep(sweep, runs[sweep.test], quick, steps) for name, sweep in SWEEPS.items()}
-    variants = {test: run_variants(test, runs[test], quick, steps) for test in VARIED_TESTS}
+    variants = {test: run_variants(test, runs[test], quick, steps) for test in BOTH}
     if out is not None:
         for name, sweep in SWEEPS.items():
             write_figure(sweep_figure(sweeps[name], sweep.title), out / f"a5-{name.partition('_')[0]}.html")
@@ -100,7 +125,10 @@ def reproduce(
         "target": "a5",
         "paper": {test: {**own, "ratio_to_rigid_single": _ratios(PAPER["rigid"], own)} for test, own in PAPER.items()},
         "polyins": {
-            **{test: with_ratios(own, tables["rigid"]) for test, own in tables.items()},
+            **{
+                test: {**with_ratios(own, tables["rigid"]), "by_block": by_block(runs[test])}
+                for test, own in tables.items()
+            },
             **sweeps,
             "variants": variants,
         },
@@ -108,7 +136,7 @@ def reproduce(
             "seeds": {
                 **seeds,
                 **{name: QUICK_SEEDS if quick else sweep.seeds for name, sweep in SWEEPS.items()},
-                "variants": QUICK_SEEDS if quick else VARIANT_SEEDS,
+                "variants": {name: QUICK_SEEDS if quick else each.seeds for name, each in VARIANTS.items()},
             },
             "outages": {name: len(nonrigid.scenario_of(name, quick).outage_intervals()) for name in seeds},
             "scenarios": {name: nonrigid.scenario_of(name, quick).model_dump(mode="json") for name in seeds},
@@ -128,12 +156,16 @@ def run_sweep(sweep: Sweep, own: Runs, quick: bool, steps: Steps) -> Document:
     }
 
 
-def run_variants(test: str, own: Runs, quick: bool, steps: Steps) -> Document:
-    """Return the figures of a test by what is assumed; `own` are its runs as it is."""
+def run_variants(test: str, own: Runs, quick: bool, steps: Steps) -> dict[str, Document]:
+    """Return the figures of a test by what is assumed, beside those of its own runs over the same seeds."""
     scenario = nonrigid.scenario_of(test, quick)
-    seeds = QUICK_SEEDS if quick else VARIANT_SEEDS
-    others = {name: run(change(scenario), seeds, steps, SWEPT) for name, change in VARIANTS.items()}
-    return {name: excess(runs, own[:seeds]) for name, runs in {"as it is": own[:seeds], **others}.items()}
+    found = {}
+    for name, variant in VARIANTS.items():
+        if test in variant.tests:
+            seeds = QUICK_SEEDS if quick else variant.seeds
+            runs = run(variant.change(scenario), seeds, steps, SWEPT)
+            found[name] = {**excess(runs, own[:seeds]), "as_it_is": excess(own[:seeds], own[:seeds])}
+    return found
 
 
 def run(scenario: Scenario, seeds: int, steps: Steps, names: Sequence[str] = ("single", *METHODS)) -> Runs:
@@ -152,6 +184,15 @@ def run(scenario: Scenario, seeds: int, steps: Steps, names: Sequence[str] = ("s
 def row(runs: Runs) -> dict[str, float]:
     """Return the rms over outages and seeds, m, by method; of `single` over all IMUs."""
     return nonrigid.pooled({name: [each[name] for each in runs] for name in runs[0]})
+
+
+def by_block(runs: Runs) -> dict[str, list[float]]:
+    """Return the ratios of IMU-Fusion for each block of seeds by itself: how far they scatter."""
+    rows = [row(runs[first : first + BLOCK]) for first in range(0, len(runs), BLOCK)]
+    return {
+        "imu_fusion_over_single": [each["imu-fusion"] / each["single"] for each in rows],
+        "imu_fusion_over_nav_fusion": [each["imu-fusion"] / each["nav-fusion"] for each in rows],
+    }
 
 
 def errors(recording: Recording, name: str) -> Array:
@@ -175,16 +216,17 @@ def with_ratios(metres: dict[str, float], rigid: dict[str, float]) -> Document:
     }
 
 
-def excess(runs: Runs, own: Runs) -> dict[str, float]:
-    """Return the methods of a sweep, m, how much more IMU-Fusion errs than Nav-Fusion, and its ratios.
+def excess(runs: Runs, own: Runs) -> Document:
+    """Return the methods of a sweep, m, how much more IMU-Fusion errs than Nav-Fusion, and the ratios.
 
     The single IMU is that of the test as it is, over the same seeds.
     """
-    found = row(runs)
+    found, single = row(runs), row(own)["single"]
     return {
         **{name: found[name] for name in SWEPT},
+        "ratio": {name: single / found[name] for name in SWEPT},
         "excess": found["imu-fusion"] - found["nav-fusion"],
-        "imu_fusion_over_single": found["imu-fusion"] / row(own)["single"],
+        "imu_fusion_over_single": found["imu-fusion"] / single,
         "imu_fusion_over_nav_fusion": found["imu-fusion"] / found["nav-fusion"],
     }
 

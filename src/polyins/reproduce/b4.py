@@ -8,7 +8,7 @@ from typing import Any
 from polyins.reproduce.robot import CONFIGURATIONS, figures, score_all, spread
 from polyins.reproduce.robot_experiments import EXPERIMENTS
 from polyins.reproduce.sites import site
-from polyins.simulation.vehicles import ROBOT
+from polyins.reproduce.vehicles import ROBOT
 
 EXPERIMENT = "base, window"
 SEED = 0

@@ -9,7 +9,7 @@ from polyins.reproduce.b4 import EXPERIMENT, SEED, SETTINGS
 from polyins.reproduce.robot import CONFIGURATIONS, figures, score_all, spread
 from polyins.reproduce.robot_experiments import EXPERIMENTS
 from polyins.reproduce.sites import site
-from polyins.simulation.vehicles import ROBOT
+from polyins.reproduce.vehicles import ROBOT
 
 Rows = Mapping[str, Sequence[tuple[float, float]]]
 """drift, percent, and heading RMSE, deg, of each test of each configuration"""

@@ -32,9 +32,9 @@ from polyins.reproduce.robot import (
 )
 from polyins.reproduce.robot_experiments import EXPERIMENTS, Experiment, World, truth
 from polyins.reproduce.sites import Site, site
+from polyins.reproduce.vehicles import CAR, ROBOT
 from polyins.simulation.run import record
 from polyins.simulation.scenario import Errors
-from polyins.simulation.vehicles import CAR, FILTER_NOISE, ROBOT, chips
 
 SEEDS = 5
 CAR_SEEDS = 3
@@ -130,10 +130,8 @@ def _settings(configurations: Configurations, experiments: dict[str, Experiment]
         {
             "runs": {name: len(labels) for name, labels in configurations.items()},
             "runs of the car and the experiments": {name: len(labels) for name, labels in FEW.items()},
-            "vehicles": {vehicle.name: asdict(vehicle) for vehicle in (ROBOT, CAR)},
+            "scenarios": {vehicle.name: vehicle.base.model_dump(mode="json") for vehicle in (ROBOT, CAR)},
             "rolling": {**asdict(RollingOptions()), "standstill": False},
-            "chips": chips().model_dump(mode="json"),
-            "filter": FILTER_NOISE.model_dump(mode="json"),
             "experiments": {name: experiment.source for name, experiment in experiments.items()},
             "experiment_seeds": {name: experiment.seeds for name, experiment in experiments.items()},
         }

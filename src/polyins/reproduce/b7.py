@@ -23,8 +23,8 @@ from polyins.reproduce.progress import Steps
 from polyins.reproduce.robot import WORKERS, Score, body_chip, figures, score, solve
 from polyins.reproduce.robot_experiments import Experiment, grade
 from polyins.reproduce.sites import Site, site
+from polyins.reproduce.vehicles import FILTER_NOISE, GYRO_SCALE_PPM, ROBOT
 from polyins.simulation.scenario import Errors as ChipErrors
-from polyins.simulation.vehicles import FILTER_NOISE, GYRO_SCALE_PPM, ROBOT
 from polyins.solution import Solution
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     `quick` takes the first minutes of the drive, one seed and half of the combinations, and the first case only.
     """
     place = site(ROBOT, quick)
-    labels, cases = (LABELS[::2], list(CASES)[:1]) if quick else (LABELS, list(CASES))
+    labels, cases = (LABELS[: len(LABELS) // 2], list(CASES)[:1]) if quick else (LABELS, list(CASES))
     seeds = {name: range(1 if quick else SEEDS if name == TABLE else CASE_SEEDS) for name in cases}
     steps = Steps(progress, sum(map(len, seeds.values())))
     runs = {

@@ -16,7 +16,7 @@ from polyins.reproduce.pictures import write_figure
 from polyins.reproduce.robot import CONFIGURATIONS, Scores, score_all
 from polyins.reproduce.robot_experiments import EXPERIMENTS
 from polyins.reproduce.sites import site
-from polyins.simulation.vehicles import ROBOT
+from polyins.reproduce.vehicles import ROBOT
 
 STEP_M = 100.0
 TITLES = {

@@ -67,6 +67,29 @@ def with_books(scenario: Scenario, thickest_mm: float) -> Scenario:
     return with_road(scenario, books=tuple(books))
 
 
+def with_books_in_order(scenario: Scenario) -> Scenario:
+    """Return the scenario with the thinnest book first, the thickest last, and every third under the right wheels."""
+    assert scenario.road is not None
+    books = scenario.road.books
+    heights = sorted(book.height_m for book in books)
+    sides = ("left", "left", "right") * (len(books) // 3)
+    laid = zip(books, heights, sides, strict=True)
+    return with_road(
+        scenario, books=tuple(book.model_copy(update={"height_m": h, "under": side}) for book, h, side in laid)
+    )
+
+
+def with_books_reversed(scenario: Scenario) -> Scenario:
+    """Return the scenario with the first book at the place of the last, and so on."""
+    assert scenario.road is not None
+    books = scenario.road.books
+    places = (book.at_m for book in books)
+    return with_road(
+        scenario,
+        books=tuple(book.model_copy(update={"at_m": at}) for book, at in zip(books[::-1], places, strict=True)),
+    )
+
+
 def with_lengths(scenario: Scenario, length_mm: float) -> Scenario:
     """Return the scenario with books of another length along the way, mm."""
     assert scenario.road is not None

@@ -6,7 +6,7 @@ Errors that the filter knows nothing of are put into what it is told: a radius, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -18,19 +18,19 @@ from polyins.config import Noise
 from polyins.recording import Recording
 from polyins.reproduce.robot import WINDOW, as_in_the_paper
 from polyins.reproduce.sites import Site
+from polyins.reproduce.vehicles import CHIPS, FILTER_NOISE, GYRO_SCALE_PPM, PRINTED_GYRO_SCALE_PPM, ROBOT
 from polyins.rig import DEG, Imu, Wheel
 from polyins.simulation import earth
 from polyins.simulation.ground import without_twist
 from polyins.simulation.run import TrueRun, record, true_run
 from polyins.simulation.scenario import Errors
-from polyins.simulation.track import Course
-from polyins.simulation.vehicles import FILTER_NOISE, GYRO_SCALE_PPM, PRINTED_GYRO_SCALE_PPM, chips
+from polyins.simulation.track import Course, Waves
 from polyins.simulation.wheel_scenario import Slip
 
 Array = NDArray[np.float64]
 World = Literal["plane", "turning", "slip", "slopes"]
 
-CONSTANT = Errors(turn_on_share=1.0)
+CONSTANT = ROBOT.base.errors
 DRIFTING = Errors(turn_on_share=1.0 - (25.0 / 200.0) ** 2)
 """25 of the 200 deg/h wander"""
 DRIFT_TIME_H = 600.0 / 3600.0
@@ -55,7 +55,7 @@ class Experiment:
     """what differs, and where its size is from"""
     world: World = "plane"
     errors: Errors = CONSTANT
-    noise: Noise = field(default_factory=chips)
+    noise: Noise = CHIPS
     """of the chips"""
     filter_noise: Noise = FILTER_NOISE
     """that the filter is told"""
@@ -89,23 +89,11 @@ def truth(site: Site, world: World = "plane") -> TrueRun:
     return site.vehicle.drive(site.scenario(earth=world))
 
 
-@dataclass(frozen=True)
-class Waves:
-    """A pitch that goes up and down along the way."""
-
-    course: Course
-
-    def __call__(self, time: Array, nu: int = 0) -> Array:
-        """Return the pitch, rad, or its first derivative, rad/s, at the times."""
-        number = 2.0 * np.pi / SLOPE_LENGTH_M
-        way = number * self.course.distance(time)
-        return SLOPE * (np.sin(way) if nu == 0 else np.cos(way) * number * self.course.distance(time, 1))
-
-
 def _over_slopes(run: TrueRun) -> TrueRun:
     """Return the run over waves of the ground, with roll as the ground has it."""
     assert isinstance(run.path.heading, Course)
-    return true_run(run.scenario, without_twist(replace(run.path, pitch=Waves(run.path.heading))))
+    waves = Waves(run.path.heading.distance, SLOPE, SLOPE_LENGTH_M)
+    return true_run(run.scenario, without_twist(replace(run.path, pitch=waves)))
 
 
 def without_earth_rate(recording: Recording) -> Recording:
@@ -185,7 +173,7 @@ def grade(base: Noise = FILTER_NOISE, **values: object) -> Noise:
 
 
 def _scales(axle: float, across: float) -> Noise:
-    return grade(chips(), gyro_scale_ppm=(axle, across, across))
+    return grade(CHIPS, gyro_scale_ppm=(axle, across, across))
 
 
 def _in_the_field(gyro_scale_ppm: float, source: str) -> Experiment:
@@ -193,7 +181,7 @@ def _in_the_field(gyro_scale_ppm: float, source: str) -> Experiment:
         source,
         world="turning",
         errors=DRIFTING.model_copy(update={"misalignment_deg": CHIP_MISALIGNMENT_DEG}),
-        noise=grade(chips(gyro_scale_ppm), correlation_time_h=DRIFT_TIME_H),
+        noise=grade(CHIPS, gyro_scale_ppm=gyro_scale_ppm, correlation_time_h=DRIFT_TIME_H),
         change=in_the_field,
         seeds=FIELD_SEEDS,
     )
@@ -214,7 +202,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         "plausible after a calibration that found 3.4 and 1.3 deg; not published", change=tilted_modules
     ),
     "clocks 5 ms off": Experiment("right against left, body the other way; one sample of 200 Hz", change=late_clocks),
-    "gyro scale 0.03": Experiment("as Table III prints it", noise=chips(PRINTED_GYRO_SCALE_PPM)),
+    "gyro scale 0.03": Experiment("as Table III prints it", noise=grade(CHIPS, gyro_scale_ppm=PRINTED_GYRO_SCALE_PPM)),
     "turning earth": Experiment("the Earth turns and the filter knows", world="turning"),
     "no gyro scale": Experiment("what everything else in Table III makes", noise=_scales(0.0, 0.0)),
     "gyro scale about the axle": Experiment("of the x gyro only", noise=_scales(GYRO_SCALE_PPM, 0.0)),
@@ -233,7 +221,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     "wandering biases": Experiment(
         "25 of the 200 deg/h and an eighth of the other errors wander within 600 s, as such chips do",
         errors=DRIFTING,
-        noise=grade(chips(), correlation_time_h=DRIFT_TIME_H),
+        noise=grade(CHIPS, correlation_time_h=DRIFT_TIME_H),
     ),
     "misaligned triads": Experiment(
         "0.2 deg about each axis, the spread of these chips in whu-array",
@@ -241,7 +229,9 @@ EXPERIMENTS: dict[str, Experiment] = {
     ),
     "slip": Experiment("up to 20 % for 1 s, every 30 s, each wheel; plausible, not published", world="slip"),
     "slopes": Experiment("pitch and roll within +-1.5 deg, waves of 60 m; plausible for a campus", world="slopes"),
-    "gyro scale 0.005": Experiment("half of the 1 % that the chip's data sheet allows", noise=chips(LOW_SCALE_PPM)),
+    "gyro scale 0.005": Experiment(
+        "half of the 1 % that the chip's data sheet allows", noise=grade(CHIPS, gyro_scale_ppm=LOW_SCALE_PPM)
+    ),
     "in the field": _in_the_field(
         GYRO_SCALE_PPM,
         "no earth rate, wandering biases, misaligned triads, radius, lever arm, heading and tilt together",

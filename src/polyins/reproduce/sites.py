@@ -7,9 +7,9 @@ from pathlib import Path
 
 from polyins import datasets
 from polyins.errors import InputError
+from polyins.reproduce.vehicles import Earth, Vehicle
 from polyins.screen import say
 from polyins.simulation.scenario import Scenario
-from polyins.simulation.vehicles import LONGEST_S, Earth, Vehicle
 from polyins.simulation.wheel_scenario import Slip
 
 QUICK_S = 200.0
@@ -22,12 +22,13 @@ class Site:
     vehicle: Vehicle
     folder: Path | None
     """of the data set; None: the laps that stand in"""
-    duration_s: float = LONGEST_S
+    duration_s: float | None = None
+    """None: the whole drive"""
 
     @property
     def source(self) -> str:
         """What the track is, in words."""
-        drive = "the whole drive" if self.duration_s == LONGEST_S else f"the first {self.duration_s:g} s"
+        drive = "the whole drive" if self.duration_s is None else f"the first {self.duration_s:g} s"
         if self.folder:
             return f"real, data set {self.vehicle.dataset}; {drive}"
         return f"synthetic laps stand in: the data set {self.vehicle.dataset} is not at hand; {drive}"
@@ -43,7 +44,7 @@ def site(vehicle: Vehicle, quick: bool = False) -> Site:
         folder = datasets.fetch(vehicle.dataset)
     except InputError:
         folder = None
-    place = Site(vehicle, folder, QUICK_S if quick else LONGEST_S)
+    place = Site(vehicle, folder, QUICK_S if quick else None)
     if folder is None:
         say(f"{vehicle.name}: {place.source}")
     return place

@@ -42,7 +42,13 @@ def find_target(name: str, out: Path) -> Callable[[bool, Callable[[float], None]
         hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
         raise InputError(f"reproduce: target {name!r} is unknown; {hint}")
     function: Callable[..., Document] = importlib.import_module(f"polyins.reproduce.{name}").reproduce
-    return partial(function, out=out) if name in WITH_REPORTS else function
+    return partial(_marked, partial(function, out=out) if name in WITH_REPORTS else function)
+
+
+def _marked(function: Callable[..., Document], quick: bool, progress: Callable[[float], None]) -> Document:
+    """Return a function's document, whose settings say whether it is the quick form."""
+    document = function(quick, progress)
+    return {**document, "settings": {**document["settings"], "quick": quick}}
 
 
 def print_document(document: Document) -> None:
@@ -53,7 +59,8 @@ def print_document(document: Document) -> None:
     if document["target"] in WITH_TABLES:
         importlib.import_module(f"polyins.reproduce.{document['target']}").print_tables(document["polyins"])
         return
-    print_table(document["target"], ["figure", "paper", "polyins"], rows_of(document))
+    form = ", quick form: not the figures of the full one" if document["settings"].get("quick") else ""
+    print_table(f"{document['target']}{form}", ["figure", "paper", "polyins"], rows_of(document))
     for text in words_of(document):
         say(text)
 
@@ -66,11 +73,17 @@ def rows_of(document: Document) -> list[list[str]]:
 
 
 def words_of(document: Document) -> list[str]:
-    """Return what a document says in words; that something stands in for a data set first."""
-    texts = [value for value in document["settings"].values() if isinstance(value, str)]
-    return [text for text in texts if "stand in" in text] + [
-        value for value in document["polyins"].values() if isinstance(value, str)
-    ]
+    """Return what a document says in words; that a data set is missing or something stands in for it first."""
+    lacking = [text for text in _texts(document["settings"]) if "stand in" in text or "not at hand" in text]
+    return lacking + [value for value in document["polyins"].values() if isinstance(value, str)]
+
+
+def _texts(value: object) -> Iterator[str]:
+    if isinstance(value, Mapping):
+        for item in value.values():
+            yield from _texts(item)
+    elif isinstance(value, str):
+        yield value
 
 
 def _leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:

@@ -47,10 +47,15 @@ def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 
     Raises InputError for positions that make no path.
     """
     times, points, spread = (np.asarray(values, dtype=float) for values in (time, position, std))
-    if len(times) <= DEGREE or not np.all(np.diff(times) > 0.0) or not np.all(spread > 0.0):
+    if (
+        len(times) <= DEGREE
+        or not np.all(np.diff(times) > 0.0)
+        or not np.all(np.isfinite(points))
+        or not np.all(spread > 0.0)
+    ):
         raise InputError(
-            f"replay: {len(times)} positions; expected at least {DEGREE + 1} at increasing times, with standard"
-            " deviations above zero"
+            f"replay: {len(times)} positions; expected at least {DEGREE + 1} at increasing times, none of them missing,"
+            " with standard deviations above zero"
         )
     grid = np.arange(-DEGREE, np.ceil((times[-1] - times[0]) / STEP) + DEGREE + 1) * STEP
     velocity, height = _smoothed(times - times[0], points, spread, grid)

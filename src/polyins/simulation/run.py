@@ -93,7 +93,7 @@ def true_run(scenario: Scenario, path: Path | None = None) -> TrueRun:
         for wheel, own_seed in zip(scenario.wheels, wheel_seed.spawn(len(scenario.wheels)), strict=True)
     )
     run = TrueRun(
-        scenario.model_copy(update={"path_seed": seed, "duration_s": path.duration}),
+        scenario.model_copy(update={"path_seed": seed, "duration_s": path.duration, "static_s": path.static}),
         path,
         increments(path, scenario.rate_hz),
         wheels,
@@ -161,7 +161,11 @@ def checked(seed: int) -> int:
 def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
     start, world = scenario.start_position(), scenario.world()
     if scenario.track:
-        return _shortened(scenario.track.path(scenario.static_s, start, world), scenario)
+        path = scenario.track.path(scenario.static_s, start, world)
+        uneven = scenario.wheels and scenario.track.slope_deg
+        return _shortened(without_twist(path) if uneven else path, scenario)
+    if scenario.replay:
+        return _shortened(scenario.replay.path(int(seed.generate_state(1)[0])), scenario)
     if scenario.shuttle:
         return scenario.shuttle.path(scenario.duration_s, scenario.static_s, start, world)
     path = drive(

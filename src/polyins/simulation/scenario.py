@@ -33,6 +33,7 @@ from polyins.simulation.error_scenario import Errors as Errors
 from polyins.simulation.flexible_scenario import Road, Rulers, Shuttle
 from polyins.simulation.path import START, TOP_SPEED, World
 from polyins.simulation.plane import Plane
+from polyins.simulation.replay_scenario import Replay
 from polyins.simulation.run import Simulation, checked, record, true_run
 from polyins.simulation.wheel_scenario import Track, WheelModule
 
@@ -119,6 +120,8 @@ class Scenario(Section):
     """of the drive, m/s; a robot's is about 2"""
     track: Track | None = None
     """a surveyed track instead of a drive"""
+    replay: Replay | None = None
+    """a surveyed drive, driven again, instead of one of its own; its length and its standing start are its own"""
     shuttle: Shuttle | None = None
     """to and fro on straights instead of a drive"""
     rate_hz: Positive = 200.0
@@ -169,8 +172,13 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _mounts_and_ground_fit(self) -> Self:
-        if self.shuttle and self.track:
-            raise blame("shuttle", "is given with a track; expected one of them")
+        ways = [name for name in ("track", "replay", "shuttle") if getattr(self, name)]
+        if len(ways) > 1:
+            raise blame(ways[-1], f"is given with a {ways[0]}; expected one of them")
+        if self.replay and self.earth != "turning":
+            raise blame("replay", "has latitudes and longitudes; expected earth: turning")
+        if self.replay and self.wheels:
+            raise blame("replay", "is of a body that leans; with wheels expected a track")
         if self.rulers and self.wheels:
             raise blame("rulers", "are given with wheels; expected one of them")
         if self.road and not self.rulers:
@@ -245,11 +253,13 @@ def read_scenario(path: str | FilePath) -> Scenario:
     Raises InputError that names file, line and key of the first thing wrong.
     """
     scenario = validated(Scenario, read_yaml(path))
-    if scenario.track is None:
-        return scenario
-    folder, track = FilePath(path).parent.resolve(), scenario.track
-    files = {key: str(folder / FilePath(getattr(track, key)).expanduser()) for key in ("file", "odometer")}
-    return scenario.model_copy(update={"track": track.model_copy(update=files)})
+    folder = FilePath(path).parent.resolve()
+    located = {}
+    for name, keys in {"track": ("file", "odometer"), "replay": ("file",)}.items():
+        if section := getattr(scenario, name):
+            files = {key: str(folder / FilePath(getattr(section, key)).expanduser()) for key in keys}
+            located[name] = section.model_copy(update=files)
+    return scenario.model_copy(update=located)
 
 
 def simulate(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Recording:

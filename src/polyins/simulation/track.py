@@ -1,4 +1,4 @@
-"""A path along a track of surveyed points at the speeds of an odometer, on level ground.
+"""A path along a track of surveyed points at the speeds of an odometer, on ground that is level or goes up and down.
 
 The points give the shape of the curve, the speeds give how it is travelled: heading is a function of the way travelled,
 so it is the course at departure as long as the vehicle stands.
@@ -54,6 +54,24 @@ class Course:
         return self.heading(way) if nu == 0 else self.heading(way, 1) * self.distance(time, 1)
 
 
+@dataclass(frozen=True)
+class Waves:
+    """A slope that goes up and down along the way."""
+
+    distance: Curve
+    """m, over s"""
+    steepest: float
+    """rad"""
+    length: float
+    """of a wave, m"""
+
+    def __call__(self, time: Array, nu: int = 0) -> Array:
+        """Return the pitch, rad, or its first derivative, rad/s, at the times."""
+        number = 2.0 * np.pi / self.length
+        way = number * self.distance(time)
+        return self.steepest * (np.sin(way) if nu == 0 else np.cos(way) * number * self.distance(time, 1))
+
+
 def track_path(
     north: ArrayLike,
     east: ArrayLike,
@@ -63,6 +81,8 @@ def track_path(
     static: float = 30.0,
     rest: float = 5.0,
     smoothing: float = 0.7,
+    steepest: float = 0.0,
+    wave: float = 60.0,
     start: ArrayLike = START,
     world: World = earth,
 ) -> Path:
@@ -71,7 +91,8 @@ def track_path(
     The curve is smoothed over `smoothing`, m. The path starts at `start`, in the world's coordinates, stands for
     `static` and at the end for `rest`, s; the speeds are smoothed over 0.7 of their interval (1 sigma) and scaled so
     that they last to the end of the curve. Backward speeds within an odometer's noise at rest, 0.05 m/s, are taken as
-    rest.
+    rest. The ground goes up and down with slopes of at most `steepest`, rad, in waves of a length `wave`, m; the roll
+    is zero.
 
     Raises InputError for points or speeds that make no path.
     """
@@ -96,7 +117,8 @@ def track_path(
     pace = _smooth_speed(times - times[0] + static + reach, speeds, step, duration)
     pace.c = pace.c * (length / float(pace.integrate(0.0, duration)))
     course = Course(heading, pace.antiderivative())
-    return path(pace, Level(), Level(), course, duration=duration, static=static, start=start, world=world)
+    slope = Waves(course.distance, steepest, wave) if steepest else Level()
+    return path(pace, Level(), slope, course, duration=duration, static=static, start=start, world=world)
 
 
 def _distinct(north: ArrayLike, east: ArrayLike) -> Array:

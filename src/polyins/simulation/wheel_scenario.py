@@ -80,7 +80,7 @@ class WheelModule(Section):
 
 
 class Track(Section):
-    """A surveyed track and the speeds at which it is travelled; the ground is level."""
+    """A surveyed track and the speeds at which it is travelled; the ground is level unless slopes are asked for."""
 
     file: str
     """a table of points in their order: latitude_deg, longitude_deg, or north_m, east_m"""
@@ -90,6 +90,10 @@ class Track(Section):
     """bends much shorter than this are smoothed away, m"""
     rest_s: NotNegative = 5.0
     """standing at the end, s"""
+    slope_deg: Annotated[Number, Field(ge=0.0, le=20.0)] = 0.0
+    """the steepest slope of ground in waves, deg; with wheels it does not twist: it rolls, short waves are flatter"""
+    slope_length_m: Positive = 60.0
+    """of a wave of the ground, m"""
 
     def path(self, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path along the track; raises InputError for files that give none."""
@@ -103,6 +107,8 @@ class Track(Section):
             static=static,
             rest=self.rest_s,
             smoothing=self.smoothing_m,
+            steepest=self.slope_deg * DEG,
+            wave=self.slope_length_m,
             start=start,
             world=world,
         )
