@@ -1,7 +1,8 @@
 VENV := .venv
 PYTHON ?= python3
 BIN := $(VENV)/bin
-PICTURES := a3-sources a5-book a5-roughness afig7-gyro split-imus
+PICTURES := a3-sources a5-book a5-roughness a5-thickness afig3-common afig3-imus afig3-std afig6-tracks afig7-accelerometer \
+	afig7-gyro afig8-errors bfig7 bfig8 bfig9 bfig10 split-imus
 
 .PHONY: demo test lint types bench live-flood reproduce pictures clean
 
@@ -29,6 +30,7 @@ types: $(BIN)/pytest
 
 reproduce: $(BIN)/polyins
 	$(BIN)/polyins reproduce all --quick --out build/reproduced >/dev/null
+	tools/complete build/reproduced/all.json
 
 # The documentation's pictures, from the full runs of the targets that draw; needs chromium.
 pictures: $(BIN)/polyins

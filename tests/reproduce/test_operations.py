@@ -1,6 +1,7 @@
 """Operations are counted, not estimated: what is known of matrix products and of the paper's totals has to come out."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -71,3 +72,33 @@ def test_the_engine_does_what_the_table_says_but_for_the_split_interval(
             assert executions[method][step] == row[step] // 200 * 201
     assert executions["enav-fusion"]["measurement_fusion"] == 201 * imus
     assert executions["enav-fusion"]["solution_fusion"] == 202 * imus
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "paper-a.md"
+ROWS = {
+    "mechanization, one IMU": "mechanization",
+    r"$\Phi$, with the error model": "transition",
+    r"$\Phi P \Phi^T + Q$": "covariance",
+    "**prediction, sum**": "prediction",
+    "$H$": "design",
+    "$K$": "gain",
+    "$P$ after the update": "covariance_update",
+    r"$\delta z$, one IMU": "residual",
+    r"$\delta \hat x$, one IMU": "correction",
+    "feedback, one IMU": "feedback",
+    "fusing measurements, one IMU": "measurement_fusion",
+    "fusing solutions, one IMU": "solution_fusion",
+}
+
+
+def test_the_page_shows_what_is_counted(measured: dict[str, dict[str, dict[str, dict[str, int]]]]) -> None:
+    steps = measured["steps"]
+    cells = [[cell.strip() for cell in line.strip("| ").split("|")] for line in PAGE.read_text().splitlines()]
+    table = {row[0]: row[1:] for row in cells if len(row) in {3, 4}}
+    for label, name in ROWS.items():
+        forms = [{"sum": sum(a1.PAPER[name])}, *(steps[form].get(name) for form in ("dense", "structured"))]
+        assert table[label] == [f"{form['sum']:,}" for form in forms if form], label
+    totals = [a1.totals(steps[form]) for form in ("dense", "structured")]
+    assert table["**one second, one IMU**"][1:] == [f"{each['single_per_s']:,}" for each in totals]
+    for n in a1.COUNTS:
+        assert table[f"eNav-Fusion / one IMU, N = {n}"][1:] == [f"{each['enav_ratio'][str(n)]:.2f}" for each in totals]

@@ -48,6 +48,20 @@ def test_mechanized_increments_return_to_the_path(point, mount_deg):
     assert angle < 1e-7
 
 
+def test_a_body_that_slips_sideways_returns_to_its_path_too():
+    slipping = path(
+        Line(8.0), Sine(0.1, 0.5), Sine(0.05, 0.3, 1.0), Line(0.3, 0.1), duration=60.0, side_speed=Sine(1.5, 0.4)
+    )
+    miss, velocity, angle = mechanized(slipping, 200.0, (0.3, -0.3, 0.26))
+    assert miss < 5e-4
+    assert velocity < 1e-5
+    assert angle < 1e-6
+    time = np.arange(0.0, 60.0, 0.1)
+    motion = slipping.motion(time)
+    sideways = np.einsum("ti,ti->t", motion.velocity, motion.C_nb[:, :, 1])
+    np.testing.assert_allclose(sideways, Sine(1.5, 0.4)(time), atol=1e-12)
+
+
 def test_what_is_left_is_the_mechanization_s_own_error():
     # the integrals do not depend on the rate, so the error falls with the third power of the interval
     drawn = drive(200.0, static=20.0, seed=1)

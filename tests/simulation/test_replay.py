@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.geodesy import displacement
+from polyins.reproduce.rigid_array import FIRST, LAST
 from polyins.rig import DEG
 from polyins.simulation.path import Path, drive
 from polyins.simulation.replay import HELD_BELOW, replay
@@ -116,13 +117,15 @@ def test_positions_that_make_no_path(fixes: tuple[Array, Array, Array], rows: in
 
 
 def test_the_real_track(data_folder: FilePath) -> None:
-    rows = np.loadtxt(data_folder / "whu-array" / "gnss_group1.txt")[:900]
+    rows = np.loadtxt(data_folder / "whu-array" / "gnss_group1.txt")
+    rows = rows[(rows[:, 0] >= FIRST) & (rows[:, 0] <= LAST)]
     points = np.column_stack([rows[:, 1:3] * DEG, rows[:, 3]])
     path = replay(rows[:, 0], points, rows[:, 4:7])
     driven = path.position(rows[:, 0] - rows[0, 0])
     apart = displacement(driven, points[0], True) - displacement(points, points[0], True)
-    assert np.abs(apart[:, :2]).max() < 0.8
-    assert path.static == pytest.approx(358.0, abs=4.0)
+    assert np.hypot(*apart[:, :2].T).max() < 1.1
+    assert np.sqrt(np.mean(apart**2)) < 0.3
+    assert path.static == pytest.approx(60.0, abs=4.0)
     time = np.arange(0.0, path.duration, 0.1)
     assert np.abs(path.speed(time, 1)).max() < 4.0
     assert np.abs(path.speed(time) * path.heading(time, 1)).max() < 4.0
@@ -175,3 +178,20 @@ def test_a_scenario_refuses_what_cannot_be_driven_again(tmp_path: FilePath, fixe
     (tmp_path / "rtk.csv").write_text("time_s,lat\n0,1\n")
     with pytest.raises(InputError, match=r"rtk\.csv: .*latitude_deg"):
         simulate(scenario)
+
+
+def test_a_nose_points_into_the_turn_where_slip_is_asked_for(fixes: tuple[Array, Array, Array], again: Path) -> None:
+    slipping = replay(*fixes, side_slip=0.5 * DEG)
+    time = np.arange(35.0, 239.0, 0.1)
+    origin = fixes[1][0]
+    apart = displacement(slipping.position(time), origin, True) - displacement(again.position(time), origin, True)
+    assert np.abs(apart).max() < 0.5
+    inwards = slipping.heading(time) - again.heading(time)
+    lateral = again.speed(time) * again.heading(time, 1)
+    assert np.corrcoef(inwards, lateral)[0, 1] > 0.98
+    assert np.abs(inwards).max() == pytest.approx(0.5 * DEG * np.abs(lateral).max(), rel=0.15)
+    motion = slipping.motion(time)
+    course = np.arctan2(motion.velocity[:, 1], motion.velocity[:, 0])
+    fast = again.speed(time) > 3.0
+    off = (course - again.heading(time) + np.pi)[fast] % (2.0 * np.pi) - np.pi
+    assert np.abs(off).max() < 0.1 * DEG

@@ -81,13 +81,14 @@ def _integrate(path: Path, edges: Array, interval: float) -> tuple[Array, Array,
 def rates(path: Path, time: Array) -> tuple[Array, Array, Array]:
     """Return w_ib^b, f^b at the origin, and the lever-arm matrix without its dw/dt, at times."""
     motion = path.motion(time)
-    speed, acceleration = path.speed(time), path.speed(time, 1)
-    # dv/dt in b is (dv/dt, 0, 0) + w_nb x v; with Coriolis (2 w_ie + w_en) x v the rates add up to w_ib + w_ie
+    speed, side = path.body_velocity(time)[:, :2].T
+    # dv/dt in b is the change of v along b's axes + w_nb x v; with Coriolis (2 w_ie + w_en) x v the rates add up to
+    # w_ib + w_ie
     turning = motion.angular_rate + motion.earth_rate
-    force = -path.world.gravity(motion.position)[:, None] * motion.C_nb[:, 2, :]
-    force[:, 0] += acceleration
+    force = path.body_velocity(time, 1) - path.world.gravity(motion.position)[:, None] * motion.C_nb[:, 2, :]
+    force[:, 0] -= turning[:, 2] * side
     force[:, 1] += turning[:, 2] * speed
-    force[:, 2] -= turning[:, 1] * speed
+    force[:, 2] += turning[:, 0] * side - turning[:, 1] * speed
     gradient = np.swapaxes(motion.C_nb, 1, 2) @ path.world.gravity_gradient(motion.position) @ motion.C_nb
     arm = double_cross_matrix(motion.angular_rate) - double_cross_matrix(motion.earth_rate) - gradient
     return motion.angular_rate, force, arm

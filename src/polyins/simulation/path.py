@@ -1,8 +1,8 @@
 """A drivable path on the rotating Earth or on a plane, smooth enough that its rates are exact derivatives.
 
-The velocity points along the body's x axis, so heading is course and pitch is slope. Speed, yaw rate, pitch and roll
-are piecewise polynomials of degree 7 with three continuous derivatives; heading is the integral of the yaw rate,
-position the integral of the velocity.
+The velocity points along the body's x axis, so heading is course and pitch is slope, unless the body slips sideways.
+Speed, yaw rate, pitch and roll are piecewise polynomials of degree 7 with three continuous derivatives; heading is the
+integral of the yaw rate, position the integral of the velocity.
 """
 
 from __future__ import annotations
@@ -122,6 +122,8 @@ class Path:
     """in the world's coordinates: (T,) -> (T, 3)"""
     world: World = earth
     """what it lies on"""
+    side_speed: Curve | None = None
+    """m/s along the body's y axis, where the body slips sideways"""
 
     def truth(self, time: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> Truth:
         """Return the true state at times, shape (T,), of a point given in the array frame, m, shape (3,).
@@ -148,11 +150,17 @@ class Path:
         attitude = np.column_stack([self.roll(time), self.pitch(time), self.heading(time)])
         C_nb = np.ascontiguousarray(rotation_matrices(quaternions(attitude)))
         position = self.position(time)
-        velocity = self.speed(time)[:, None] * C_nb[:, :, 0]
+        velocity = _to_level(C_nb, self.body_velocity(time))
         earth_rate = self.world.earth_rate(position)
         level_rate = _to_body(C_nb, earth_rate + self.world.transport_rate(position, velocity))
         angular_rate = level_rate + self._body_rate(time, attitude)
         return Motion(position, velocity, attitude, C_nb, _to_body(C_nb, earth_rate), angular_rate)
+
+    def body_velocity(self, time: Array, nu: int = 0) -> Array:
+        """Return the velocity along the body's axes, m/s, or a derivative of it, at times, shape (T, 3)."""
+        none = np.zeros_like(time)
+        side = none if self.side_speed is None else self.side_speed(time, nu)
+        return np.column_stack([self.speed(time, nu), side, none])
 
     def _body_rate(self, time: Array, attitude: Array) -> Array:
         """Return w_nb in b, rad/s, shape (T, 3), from the derivatives of roll, pitch and heading."""
@@ -177,20 +185,27 @@ def path(
     static: float = 0.0,
     start: ArrayLike = START,
     world: World = earth,
+    side_speed: Curve | None = None,
 ) -> Path:
-    """Return the path that starts at a position, in the world's coordinates, and moves along its body's x axis."""
+    """Return the path that starts at a position, in the world's coordinates, and moves along its body's x axis.
+
+    With a `side_speed`, m/s, it also moves along its y axis.
+    """
     from scipy.interpolate import CubicSpline
 
     time = np.linspace(0.0, duration, int(np.ceil(duration / POSITION_STEP)) + 1)
     p, y = pitch(time), heading(time)
     velocity = speed(time)[:, None] * np.stack([np.cos(p) * np.cos(y), np.cos(p) * np.sin(y), -np.sin(p)], axis=-1)
+    if side_speed is not None:
+        (sr, sp, sy), (cr, cp, cy) = (f([roll(time), p, y]) for f in (np.sin, np.cos))
+        velocity += side_speed(time)[:, None] * np.stack([sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp], -1)
     begin = np.asarray(start, dtype=float)
     position = np.broadcast_to(begin, (time.size, 3))
     for _ in range(PICARD_STEPS):
         integral = CubicSpline(time, world.displacement(position, velocity)).antiderivative()
         integral.c[-1] += begin
         position = integral(time)
-    return Path(duration, static, speed, roll, pitch, heading, integral, world)
+    return Path(duration, static, speed, roll, pitch, heading, integral, world, side_speed)
 
 
 def drive(
@@ -263,6 +278,11 @@ def _road(rng: np.random.Generator) -> tuple[float, float]:
     """Return slope and camber, rad."""
     slope, camber = rng.normal(0.0, (SLOPE_STD, CAMBER_STD))
     return float(np.clip(slope, -SLOPE_LIMIT, SLOPE_LIMIT)), float(camber)
+
+
+def _to_level(C_nb: Array, vector: Array) -> Array:
+    """Return vectors of b, shape (T, 3), in n."""
+    return np.asarray(np.einsum("tij,tj->ti", C_nb, vector))
 
 
 def _to_body(C_nb: Array, vector: Array) -> Array:

@@ -2,7 +2,8 @@
 
 A quintic smoothing spline through the positions gives the horizontal velocity; its size is the speed and its direction
 the heading, which is held below a speed at which noise would turn it. The slope is that of the smoothed height over the
-way travelled. Camber and the body's lean on its springs are not in the data: they are small plausible ones.
+way travelled. Camber and the body's lean on its springs are not in the data: they are small plausible ones. The body
+does not slip sideways unless it is asked to.
 """
 
 from __future__ import annotations
@@ -38,11 +39,12 @@ PITCH_PER_ACCELERATION = 0.2 * DEG
 """per m/s^2; passenger cars dive and squat by 1.5 to 2.5 deg per g"""
 
 
-def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 0) -> Path:
+def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 0, side_slip: float = 0.0) -> Path:
     """Return the path along positions, (latitude rad, longitude rad, height m), shape (P, 3), at times, s, shape (P,).
 
     `std` is how sure they are, m, north, east, down, shape (P, 3); the path's time 0 is that of the first. `seed` draws
-    the camber. The positions are those of the point that becomes the array origin.
+    the camber. The positions are those of the point that becomes the array origin. In turns the nose points inwards
+    of the course by `side_slip`, rad per m/s^2 of lateral acceleration.
 
     Raises InputError for positions that make no path.
     """
@@ -66,14 +68,17 @@ def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 
         raise InputError(f"replay: the positions never move faster than {STANDS_BELOW:g} m/s; expected a drive")
     heading = _course(velocity, speed, way)
     roll, pitch = _attitude(speed, heading, way, height, np.random.default_rng(seed))
+    inwards = side_slip * speed * np.gradient(heading, STEP)
+    along = speed / np.cos(pitch)
     return path(
-        _curve(grid, speed / np.cos(pitch)),
+        _curve(grid, along * np.cos(inwards)),
         _curve(grid, roll),
         _curve(grid, pitch),
-        _curve(grid, heading),
+        _curve(grid, heading + inwards),
         duration=float(times[-1] - times[0]),
         static=standing_start(grid, speed),
         start=points[0],
+        side_speed=_curve(grid, -along * np.sin(inwards)) if side_slip else None,
     )
 
 

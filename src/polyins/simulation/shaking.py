@@ -95,7 +95,7 @@ def shaken_path(path: Path, shaking: Shaking) -> ShakenPath:
     """Return the path of the body of a robot that shakes about a smooth path."""
     return ShakenPath(
         path.duration, path.static, path.speed, path.roll, path.pitch, path.heading, path.position, path.world,
-        shaking.curve(),
+        path.side_speed, shaking.curve(),
     )  # fmt: skip
 
 
