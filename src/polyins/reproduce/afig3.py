@@ -189,7 +189,7 @@ def against_share(shares: Sequence[float], seeds: int, steps: Steps) -> dict[str
 def write_pictures(out: FilePath, time: Array, std: Array, by_count: Document, by_share: Document) -> None:
     """Write the three figures."""
     curves = {f"IMU {k}": (time.tolist(), row[:, 1].tolist()) for k, row in enumerate(std, 1)}
-    write_figure(lines(curves, "time since start (s)", "east std (m)"), out / "afig3-std.html")
+    write_figure(lines(curves, "time since start (s)", "east std (m)", markers=False), out / "afig3-std.html")
     counts = [float(n) for n in next(iter(by_count.values()))]
     ratios = {name: (counts, list(row.values())) for name, row in by_count.items()}
     ratios["sqrt(N)"] = (counts, np.sqrt(counts).tolist())
