@@ -32,7 +32,7 @@ class Dataset:
 
 DATASETS = {
     "quadrotor": Dataset(
-        summary="4 Xsens DOT on a quadrotor, 120 Hz, and its RTK position, 10 Hz; 29 flights of 14 to 55 s",
+        summary="4 Xsens DOT on a quadrotor, 120 Hz, and its RTK position, 10 Hz; 30 flights of 14 to 55 s",
         licence="CC BY 4.0",
         source="https://github.com/ansfl/Quadrotor-Dead-Reckoning-with-Multiple-Inertial-Sensors",
         address="https://raw.githubusercontent.com/ansfl/Quadrotor-Dead-Reckoning-with-Multiple-Inertial-Sensors/"

@@ -97,14 +97,15 @@ def test_a3_without_the_data_set_says_so(small: Scenario, monkeypatch: pytest.Mo
     ) == {key: value for key, value in ours["uncompensated"]["group1"].items() if key != "ratio"}
 
 
-def test_exact_sensors_and_exact_fixes_leave_no_error(data_folder: Path, small: Scenario) -> None:
+@pytest.mark.parametrize("rate_hz", [25.0, 100.0])
+def test_exact_sensors_and_exact_fixes_leave_no_error(data_folder: Path, small: Scenario, rate_hz: float) -> None:
     """The replayed track, its increments and the filter agree: what remains is far below any error of Table III."""
     assert data_folder
     nothing = small.errors.model_copy(update={key: 0.0 for key in small.errors.model_dump() if "_" in key})
     nothing = nothing.model_copy(update={"noise": False, "biases": False, "chips": ()})
     assert small.gnss is not None
     exact = small.gnss.model_copy(update={"position_std_m": (1e-4, 1e-4, 1e-4)})
-    run = rigid_array.drive(small.model_copy(update={"errors": nothing, "gnss": exact, "rate_hz": 100.0}))
+    run = rigid_array.drive(small.model_copy(update={"errors": nothing, "gnss": exact, "rate_hz": rate_hz}))
     assert rigid_array.maxima(record(run, seed=0).recording, "single").max() < 0.1
 
 

@@ -141,3 +141,6 @@ def test_vehicles_have_the_lab_s_settings():
         assert left.position_m[1] == -right.position_m[1] < 0.0
         assert isinstance(scenario.filter_noise, Noise)
         assert scenario.gnss is None
+    # the car's chips are the robot's
+    for key in ("noise", "filter_noise", "errors", "static_s"):
+        assert getattr(ROBOT.base, key) == getattr(CAR.base, key)

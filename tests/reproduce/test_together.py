@@ -59,6 +59,16 @@ def test_targets_of_pictures_are_targets() -> None:
     assert set(together.SECONDS) | set(together.ALONE) <= set(targets.TARGETS)
 
 
+@pytest.mark.parametrize("quick", [True, False])
+def test_a_document_says_whether_it_is_the_quick_form(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], quick: bool
+) -> None:
+    document = targets.find_target("afig6", tmp_path)(quick, lambda _: None)
+    assert document["settings"]["quick"] is quick
+    targets.print_document(document)
+    assert ("quick form" in capsys.readouterr().err) is quick
+
+
 def test_the_robot_s_way_is_to_and_fro(tmp_path: Path) -> None:
     document = afig6.reproduce(quick=True, out=tmp_path)
     for test in ("test A", "test B"):

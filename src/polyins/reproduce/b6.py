@@ -83,7 +83,6 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
             "tracks": {"robot": robot.source, "car": car.source},
             **_settings(configurations, experiments),
             "seeds": {"robot": len(seeds), "car": len(car_seeds)},
-            "quick": quick,
         },
     }
 
@@ -131,6 +130,7 @@ def _settings(configurations: Configurations, experiments: dict[str, Experiment]
             "runs": {name: len(labels) for name, labels in configurations.items()},
             "runs of the car and the experiments": {name: len(labels) for name, labels in FEW.items()},
             "scenarios": {vehicle.name: vehicle.base.model_dump(mode="json") for vehicle in (ROBOT, CAR)},
+            "stand-ins": {vehicle.name: asdict(vehicle.stand_in) for vehicle in (ROBOT, CAR)},
             "rolling": {**asdict(RollingOptions()), "standstill": False},
             "experiments": {name: experiment.source for name, experiment in experiments.items()},
             "experiment_seeds": {name: experiment.seeds for name, experiment in experiments.items()},

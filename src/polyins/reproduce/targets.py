@@ -56,11 +56,12 @@ def print_document(document: Document) -> None:
 
     Those with tables of their own print these instead.
     """
+    if document["settings"].get("quick"):
+        say(f"{document['target']}: the quick form, whose figures are not those of the full one")
     if document["target"] in WITH_TABLES:
         importlib.import_module(f"polyins.reproduce.{document['target']}").print_tables(document["polyins"])
         return
-    form = ", quick form: not the figures of the full one" if document["settings"].get("quick") else ""
-    print_table(f"{document['target']}{form}", ["figure", "paper", "polyins"], rows_of(document))
+    print_table(document["target"], ["figure", "paper", "polyins"], rows_of(document))
     for text in words_of(document):
         say(text)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -21,6 +22,8 @@ SECONDS = {"a3": (13, 240), "a5": (28, 2500), "a6": (7, 180), "afig3": (9, 120),
            "b7": (38, 180), "b8": (5, 40), "flights": (10, 40), "split": (12, 120), "wid": (42, 60)}  # fmt: skip
 """About how long a target takes on one core, quick and in full, for the bar and to begin with the longest."""
 OTHERS_S = 5, 30
+FRAME, LEAST_HEIGHT = 30, 450
+"""pixels around a figure, and for one that does not say its height"""
 
 
 def reproduce(
@@ -68,6 +71,12 @@ def reproduce(
     }
 
 
+def height(picture: Path) -> int:
+    """Return how many pixels a page needs to show its figure, which says its own height last."""
+    heights = re.findall(r'"height":(\d+)', picture.read_text(encoding="utf-8"))
+    return int(heights[-1]) + FRAME if heights else LEAST_HEIGHT
+
+
 def parts(document: Document) -> list[Document]:
     """Return the documents of the targets that a document of several holds."""
     sides = ("paper", "polyins", "settings")
@@ -75,14 +84,14 @@ def parts(document: Document) -> list[Document]:
 
 
 def page(documents: Mapping[str, Document], missing: Mapping[str, str], out: Path, quick: bool) -> str:
-    """Return the page: of each target its pictures, `out`/TARGET-*.html, and its figures beside the paper's."""
+    """Return the page: of each target its pictures, `out`/TARGET*.html, and its figures beside the paper's."""
     from jinja2 import Environment, PackageLoader
 
     template = Environment(loader=PackageLoader("polyins.reproduce", "."), autoescape=True).get_template("page.html.j2")
     sections: list[dict[str, Any]] = [
         {
             "name": name,
-            "pictures": [file.name for file in sorted(out.glob(f"{name}-*.html"))],
+            "pictures": [(file.name, height(file)) for file in sorted(out.glob(f"{name}*.html"))],
             "rows": targets.rows_of(document),
             "words": targets.words_of(document),
         }

@@ -42,7 +42,7 @@ class Vehicle:
         self,
         folder: FilePath | None = None,
         *,
-        earth: Earth = "plane",
+        earth: Earth | None = None,
         noise: Noise | None = None,
         errors: Errors | None = None,
         slip: Slip | None = None,
@@ -55,11 +55,11 @@ class Vehicle:
         unless given. The filter knows the radius that fits each chip's gyro.
         """
         track = Track(file=str(folder / "track.csv"), odometer=str(folder / "odometer.csv")) if folder else None
-        given: dict[str, Any] = {"noise": noise, "errors": errors, "duration_s": duration_s}
+        given: dict[str, Any] = {"earth": earth, "noise": noise, "errors": errors, "duration_s": duration_s}
         if slip:
             given["wheels"] = tuple(wheel.model_copy(update={"slip": slip}) for wheel in self.base.wheels)
         changed = {key: value for key, value in given.items() if value is not None}
-        return self.base.model_copy(update={"earth": earth, "track": track, **changed})
+        return self.base.model_copy(update={"track": track, **changed})
 
     def drive(self, scenario: Scenario) -> TrueRun:
         """Return the truth of its scenario; the stand-in's laps are driven where the scenario has no track."""

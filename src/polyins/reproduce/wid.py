@@ -127,7 +127,7 @@ def reproduce(
             "controls": plain(mean(controls.values())),
             "controls_by_trial": plain(controls),
         },
-        "settings": {**settings, "trials": numbers, "methods": METHODS | FURTHER, "quick": quick},
+        "settings": {**settings, "trials": numbers, "methods": METHODS | FURTHER},
     }
 
 

@@ -70,6 +70,8 @@ def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 
     roll, pitch = _attitude(speed, heading, way, height, np.random.default_rng(seed))
     inwards = side_slip * speed * np.gradient(heading, STEP)
     along = speed / np.cos(pitch)
+    # a body that leans slips downwards too: its nose takes that back, for the height is the road's
+    pitch = pitch - np.tan(inwards) * np.sin(roll)
     return path(
         _curve(grid, along * np.cos(inwards)),
         _curve(grid, roll),

@@ -18,11 +18,10 @@ class Replay(Section):
     """Positions of a drive, as RTK gives them: speed, course and slope follow; camber and lean are drawn."""
 
     file: str
-    """a table of positions: time_s, latitude_deg, longitude_deg, height_m"""
+    """a table of positions of what becomes the array origin: time_s, latitude_deg, longitude_deg, height_m"""
     position_std_m: PositiveSpread = (0.02, 0.02, 0.04)
     """of the positions, north, east, down: the path is smoothed as far as that allows, m"""
-
-    side_slip_deg_per_m_s2: Annotated[Number, Field(ge=0.0, le=5.0)] = 0.0
+    side_slip_deg_per_m_s2: Annotated[Number, Field(ge=0.0, le=2.0)] = 0.0
     """by how much the nose points inwards of the course in a turn, deg per m/s^2; cars at speed have about 0.3"""
 
     def path(self, seed: int) -> Path:

@@ -88,12 +88,13 @@ def true_run(scenario: Scenario, path: Path | None = None) -> TrueRun:
     seed = scenario.seed if scenario.path_seed is None else scenario.path_seed
     drive_seed, _, _, wheel_seed, ground_seed = np.random.SeedSequence(seed).spawn(5)
     path = _path(scenario, drive_seed) if path is None else _shortened(path, scenario)
+    fitted = _fitted(scenario.model_copy(update={"path_seed": seed}), path)
     wheels = tuple(
         wheel.rolls(path, np.random.default_rng(own_seed))
         for wheel, own_seed in zip(scenario.wheels, wheel_seed.spawn(len(scenario.wheels)), strict=True)
     )
     run = TrueRun(
-        scenario.model_copy(update={"path_seed": seed, "duration_s": path.duration, "static_s": path.static}),
+        fitted,
         path,
         increments(path, scenario.rate_hz),
         wheels,
@@ -180,7 +181,21 @@ def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
 
 
 def _shortened(path: Path, scenario: Scenario) -> Path:
-    return replace(path, duration=min(path.duration, scenario.duration_s))
+    """Return the path up to the duration that the scenario gives; all of it if it gives none."""
+    return replace(path, duration=min(path.duration, scenario.duration_s)) if scenario.limited else path
+
+
+def _fitted(scenario: Scenario, path: Path) -> Scenario:
+    """Return the scenario with the duration and the standing start of its path; raise InputError if it does not fit."""
+    if path.static >= path.duration:
+        raise InputError(f"duration_s: is {path.duration:g}; expected more than the {path.static:g} s it stands first")
+    fitted = scenario.model_copy(update={"duration_s": path.duration, "static_s": path.static})
+    for begin, end in fitted.outage_intervals():
+        if end > path.duration + 1e-6:
+            raise InputError(
+                f"outages: [{begin:g}, {end:g}]; expected [from, to] within the {path.duration:g} s of the drive"
+            )
+    return fitted
 
 
 def _sense(

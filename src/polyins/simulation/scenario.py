@@ -107,7 +107,7 @@ class Scenario(Section):
     path_seed: Annotated[int, Field(ge=0, strict=True)] | None = None
     """of the drive and the wheels' slip, where they are to stay while seed draws other errors; without it seed"""
     duration_s: Positive = 1000.0
-    """the standing start included, s; a track may end before"""
+    """the standing start included, s; a track or a replay is driven to its end unless this is given"""
     static_s: NotNegative = 60.0
     """length of the standing start, s"""
     earth: Literal["turning", "plane"] = "turning"
@@ -149,8 +149,10 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _fits_its_duration(self) -> Self:
+        if (self.track or self.replay) and not self.limited:
+            return self
         inside = f"expected within the {self.duration_s:g} s of duration_s"
-        if self.static_s >= self.duration_s:
+        if self.static_s >= self.duration_s and not self.replay:
             raise ValueError(f"static_s is {self.static_s:g}; {inside}")
         if self.duration_s * self.rate_hz < 2.0:
             raise ValueError(f"rate_hz is {self.rate_hz:g}; expected at least two samples {inside[9:]}")
@@ -177,6 +179,8 @@ class Scenario(Section):
             raise blame(ways[-1], f"is given with a {ways[0]}; expected one of them")
         if self.replay and self.earth != "turning":
             raise blame("replay", "has latitudes and longitudes; expected earth: turning")
+        if self.replay and self.start:
+            raise blame("start", "is given with a replay, which starts where it did; expected one of them")
         if self.replay and self.wheels:
             raise blame("replay", "is of a body that leans; with wheels expected a track")
         if self.rulers and self.wheels:
@@ -194,6 +198,11 @@ class Scenario(Section):
             if name in names[:index]:
                 raise blame("wheels", f"two modules are named {name!r}; expected a name of its own for each")
         return self
+
+    @property
+    def limited(self) -> bool:
+        """Whether it says how long it drives."""
+        return "duration_s" in self.model_fields_set
 
     def world(self) -> World:
         """Return what the path lies on."""

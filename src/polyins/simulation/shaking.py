@@ -6,7 +6,7 @@ pitch, then roll. What the tyres do is in `tyres`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,10 +93,7 @@ class ShakenPath(Path):
 
 def shaken_path(path: Path, shaking: Shaking) -> ShakenPath:
     """Return the path of the body of a robot that shakes about a smooth path."""
-    return ShakenPath(
-        path.duration, path.static, path.speed, path.roll, path.pitch, path.heading, path.position, path.world,
-        path.side_speed, shaking.curve(),
-    )  # fmt: skip
+    return ShakenPath(**{field.name: getattr(path, field.name) for field in fields(Path)}, shaking=shaking.curve())
 
 
 def rotation_matrices_of(roll: Array, pitch: Array) -> Array:

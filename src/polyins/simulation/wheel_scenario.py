@@ -90,7 +90,7 @@ class Track(Section):
     """bends much shorter than this are smoothed away, m"""
     rest_s: NotNegative = 5.0
     """standing at the end, s"""
-    slope_deg: Annotated[Number, Field(ge=0.0, le=20.0)] = 0.0
+    slope_deg: Annotated[Number, Field(ge=0.0, le=5.0)] = 0.0
     """the steepest slope of ground in waves, deg; with wheels it does not twist: it rolls, short waves are flatter"""
     slope_length_m: Positive = 60.0
     """of a wave of the ground, m"""
