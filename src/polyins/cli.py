@@ -345,6 +345,8 @@ def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
     with compilation_said(), progress(target) as update:
         document = function(quick, update) if function else together.reproduce(target, names, quick, out, update, say)
     results.write_document(out / f"{target}.json", document)
+    if quick:
+        say("the quick form: its figures are not those of the full one")
     if as_json:
         print(results.as_json(document))
     elif names:

@@ -108,7 +108,7 @@ def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pyte
     variants = document["polyins"]["variants"]
     assert set(variants["test B"]) == set(a5.VARIANTS)
     assert "books the other way round" not in variants["test A"]
-    assert variants["test A"]["round wheels"]["as_it_is"]["imu_fusion_over_nav_fusion"] == pytest.approx(2.0)
+    assert variants["test A"]["round wheels"]["imu_fusion_over_nav_fusion"] == pytest.approx(2.0)
 
 
 def test_what_is_swept_is_all_that_changes() -> None:

@@ -1,11 +1,13 @@
 """Several targets in one run: one document, one page, and what is missing is said."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from polyins.cli import cli
 from polyins.errors import InputError
 from polyins.reproduce import afig6, afig7, targets, together
 
@@ -60,12 +62,12 @@ def test_targets_of_pictures_are_targets() -> None:
 
 
 @pytest.mark.parametrize("quick", [True, False])
-def test_a_document_says_whether_it_is_the_quick_form(
+def test_document_and_screen_say_whether_it_is_the_quick_form(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], quick: bool
 ) -> None:
-    document = targets.find_target("afig6", tmp_path)(quick, lambda _: None)
-    assert document["settings"]["quick"] is quick
-    targets.print_document(document)
+    words = ["reproduce", "afig6", "--out", str(tmp_path), *(["--quick"] if quick else [])]
+    cli.main(words, prog_name="polyins", standalone_mode=False)
+    assert json.loads((tmp_path / "afig6.json").read_text())["settings"]["quick"] is quick
     assert ("quick form" in capsys.readouterr().err) is quick
 
 

@@ -157,14 +157,14 @@ def run_sweep(sweep: Sweep, own: Runs, quick: bool, steps: Steps) -> Document:
 
 
 def run_variants(test: str, own: Runs, quick: bool, steps: Steps) -> dict[str, Document]:
-    """Return the figures of a test by what is assumed, beside those of its own runs over the same seeds."""
+    """Return the figures of a test by what is assumed; `own` are its runs as it is."""
     scenario = nonrigid.scenario_of(test, quick)
     found = {}
     for name, variant in VARIANTS.items():
         if test in variant.tests:
             seeds = QUICK_SEEDS if quick else variant.seeds
             runs = run(variant.change(scenario), seeds, steps, SWEPT)
-            found[name] = {**excess(runs, own[:seeds]), "as_it_is": excess(own[:seeds], own[:seeds])}
+            found[name] = excess(runs, own[:seeds])
     return found
 
 

@@ -56,8 +56,6 @@ def print_document(document: Document) -> None:
 
     Those with tables of their own print these instead.
     """
-    if document["settings"].get("quick"):
-        say(f"{document['target']}: the quick form, whose figures are not those of the full one")
     if document["target"] in WITH_TABLES:
         importlib.import_module(f"polyins.reproduce.{document['target']}").print_tables(document["polyins"])
         return
