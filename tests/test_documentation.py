@@ -39,7 +39,7 @@ from polyins.io.yaml_document import read_yaml
 from polyins.recording import GnssStream, ImuStream, Reference
 from polyins.simulation import error_scenario, flexible_scenario, scenario
 from polyins.simulation.replay_scenario import Replay
-from polyins.simulation.wheel_scenario import Slip, Track, WheelModule
+from polyins.simulation.wheel_scenario import Laps, Slip, Track, WheelModule
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PAGES = [REPOSITORY / "README.md", REPOSITORY / "CHANGELOG.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
@@ -452,6 +452,7 @@ SCENARIO: dict[str, type[BaseModel]] = {
     "wheels[]": WheelModule,
     "wheels[].slip": Slip,
     "track": Track,
+    "laps": Laps,
     "replay": Replay,
 }
 KINDS = (

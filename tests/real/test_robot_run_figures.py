@@ -7,7 +7,7 @@ import pytest
 
 from polyins.reproduce import b6, b7
 from polyins.reproduce.robot import FEW, score, score_all, solve, table
-from polyins.reproduce.robot_experiments import EXPERIMENTS
+from polyins.reproduce.robot_experiments import EXPERIMENTS, truth
 from polyins.reproduce.sites import Site
 from polyins.reproduce.vehicles import ROBOT
 
@@ -26,7 +26,7 @@ def base(place):
 
 
 def test_wheel_ins_without_errors_stays_on_the_track(place):
-    furthest = b6.error_free_run(place, "plane")
+    furthest = b6.error_free_run(truth(place, "level"), b6.WHEELS)
     assert furthest["window, 0.1 s"] < 0.005
     assert furthest["window, 0.005 s"] < 0.005
     assert furthest["end, 0.005 s"] < 0.1

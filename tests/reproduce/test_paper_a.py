@@ -104,7 +104,8 @@ def test_exact_sensors_and_exact_fixes_leave_no_error(data_folder: Path, small: 
     nothing = small.errors.model_copy(update={key: 0.0 for key in small.errors.model_dump() if "_" in key})
     nothing = nothing.model_copy(update={"noise": False, "biases": False, "chips": ()})
     assert small.gnss is not None
-    exact = small.gnss.model_copy(update={"position_std_m": (1e-4, 1e-4, 1e-4)})
+    fine, nothing_slow = (1e-4, 1e-4, 1e-4), (0.0, 0.0, 0.0)
+    exact = small.gnss.model_copy(update={"position_std_m": fine, "slow_std_m": nothing_slow, "stated_std_m": fine})
     run = rigid_array.drive(small.model_copy(update={"errors": nothing, "gnss": exact, "rate_hz": rate_hz}))
     assert rigid_array.maxima(record(run, seed=0).recording, "single").max() < 0.1
 

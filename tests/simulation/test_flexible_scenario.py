@@ -5,7 +5,9 @@ import pytest
 
 from polyins.errors import InputError
 from polyins.reproduce import nonrigid
+from polyins.simulation import flexible_scenario
 from polyins.simulation.error_scenario import Errors
+from polyins.simulation.road import ground
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import read_scenario, simulate
 
@@ -41,6 +43,26 @@ def test_outages_begin_when_the_front_wheels_reach_the_first_book():
     found = [outage[0] for outage in scenario.outage_intervals()]
     np.testing.assert_allclose(found, expected[: len(found)], atol=0.01)
     assert len(found) == 7
+
+
+def test_the_seed_shuffles_the_books_if_it_is_asked_to(monkeypatch):
+    laid = []
+
+    def noted(length, roughness, bumps, wheel, rng):
+        laid.append(bumps)
+        return ground(length, roughness, bumps, wheel, rng)
+
+    monkeypatch.setattr(flexible_scenario, "ground", noted)
+    scenario = nonrigid.scenario_of("test B", quick=True).model_copy(update={"duration_s": 90.0, "outages": ()})
+    for shuffled, seed in ((False, 1), (True, 1), (True, 1), (True, 2)):
+        road = scenario.road.model_copy(update={"books_shuffled": shuffled})
+        true_run(scenario.model_copy(update={"road": road, "seed": seed}))
+    own, one, again, other = laid
+    assert one == again
+    for key in (("begin",), ("height", "length"), ("left", "right")):
+        sets = [sorted(tuple(getattr(bump, name) for name in key) for bump in bumps) for bumps in laid]
+        assert sets[0] == sets[1] == sets[3], key
+    assert len({tuple(sorted((bump.begin, bump.height) for bump in bumps)) for bumps in (own, one, other)}) == 3
 
 
 @pytest.mark.parametrize("test", TESTS)

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from polyins.errors import InputError
 from polyins.reproduce.vehicles import CAR, ROBOT
-from polyins.simulation.laps import Laps
+from polyins.simulation.laps import lap_length, lap_points
 from polyins.simulation.plane import Plane
 from polyins.simulation.run import true_run
+from polyins.simulation.scenario import read_scenario
+from polyins.simulation.wheel_scenario import Laps
 
 LAPS = Laps(length_m=40.0, width_m=20.0, corner_m=4.0, count=3, speed_m_s=1.5, change_m_s=0.5)
 
@@ -18,8 +21,8 @@ def path():
 
 def test_laps_close_and_turn_left(path):
     around = 2.0 * (40.0 + 20.0) - 8.0 * 4.0 + 2.0 * np.pi * 4.0
-    assert LAPS.around_m == pytest.approx(around)
-    north, east = LAPS.points()
+    assert lap_length(40.0, 20.0, 4.0) == pytest.approx(around)
+    north, east = lap_points(40.0, 20.0, 4.0, 3)
     each = np.round(np.arange(4) * around / 0.5).astype(int)[:3]
     np.testing.assert_allclose(np.hypot(north[each], east[each]), 0.0, atol=0.3)
     assert np.ptp(north) == pytest.approx(40.0, abs=0.3)
@@ -46,7 +49,7 @@ def test_laps_begin_and_end_at_rest(path):
 @pytest.mark.parametrize("vehicle", [ROBOT, CAR], ids=lambda vehicle: vehicle.name)
 def test_stand_ins_are_drivable(vehicle):
     scenario = vehicle.scenario()
-    path = vehicle.laps(scenario)
+    path = true_run(scenario).path
     time = np.arange(0.0, path.duration, 0.1)
     speed = path.speed(time)
     assert np.abs(path.speed(time, 1)).max() < 1.0
@@ -55,9 +58,38 @@ def test_stand_ins_are_drivable(vehicle):
     assert speed.max() / scenario.wheels[0].radius_m < np.radians(2000.0)
 
 
-def test_a_run_takes_the_path_that_it_is_given_up_to_its_duration():
-    scenario = ROBOT.scenario(duration_s=40.0)
-    run = true_run(scenario, ROBOT.laps(scenario))
-    assert run.path.duration == run.scenario.duration_s == 40.0
-    laps = ROBOT.laps(scenario)
-    np.testing.assert_array_equal(run.path.position(np.array([39.0])), laps.position(np.array([39.0])))
+@pytest.mark.parametrize("vehicle", [ROBOT, CAR], ids=lambda vehicle: vehicle.name)
+def test_vehicles_go_up_and_down_and_lean_as_the_ground_does(vehicle):
+    hilly, level = (true_run(vehicle.scenario(level=level, duration_s=700.0)).path for level in (False, True))
+    time = np.arange(40.0, 700.0, 0.1)
+    for tilt in (hilly.roll(time), hilly.pitch(time)):
+        # to both sides, and no more than the slopes that the file has
+        assert np.ptp(np.degrees(tilt)) > 0.4
+        assert np.abs(np.degrees(tilt)).max() < 2.0
+    assert not level.roll(time).any()
+    assert not level.pitch(time).any()
+    np.testing.assert_array_equal(hilly.heading(time), level.heading(time))
+
+
+def test_laps_are_driven_to_their_end_unless_a_duration_is_given():
+    whole, part = (true_run(ROBOT.scenario(duration_s=duration)) for duration in (None, 40.0))
+    assert part.path.duration == part.scenario.duration_s == 40.0
+    assert whole.scenario.duration_s == whole.path.duration > 900.0
+    at = np.array([39.0])
+    np.testing.assert_array_equal(part.path.position(at), whole.path.position(at))
+
+
+@pytest.mark.parametrize(
+    ("laps", "problem"),
+    [
+        ("{corner_m: 20, width_m: 30, length_m: 90}", "laps.corner_m: is 20; expected at most half of"),
+        ("{speed_m_s: 1, change_m_s: 1}", "laps.change_m_s: is 1; expected less than the 1 of speed_m_s"),
+        ("{count: 0}", "laps.count"),
+        ("{}\nshuttle: {}", "shuttle: is given with a laps; expected one of them"),
+    ],
+)
+def test_laps_that_nothing_can_drive_are_refused(tmp_path, laps, problem):
+    file = tmp_path / "scenario.yaml"
+    file.write_text(f"laps: {laps}\n")
+    with pytest.raises(InputError, match=problem):
+        read_scenario(file)

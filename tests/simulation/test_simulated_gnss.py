@@ -46,6 +46,24 @@ def test_noise_is_what_the_stream_claims():
     np.testing.assert_array_equal(stream.velocity_std, np.tile(velocity_std, (stream.time.size, 1)))
 
 
+def test_slow_errors_wander_within_their_time_and_are_not_what_the_stream_claims():
+    long, white, slow, stated = drive(2000.0, static=20.0, seed=1), 0.05, np.array([0.5, 1.0, 2.0]), [0.3, 0.2, 0.1]
+    rng = np.random.default_rng(5)
+    stream = fixes(
+        long, ANTENNA, rng=rng, position_std=white, slow_std=slow, slow_time=5.0, stated_std=stated, rate_hz=10.0
+    )
+    errors = offsets(stream.position, long.truth(stream.time, ANTENNA).position)
+    np.testing.assert_allclose(errors.std(axis=0), np.hypot(white, slow), rtol=0.15)
+    np.testing.assert_array_equal(stream.position_std, np.tile(stated, (stream.time.size, 1)))
+    # after the correlation time 1/e is left
+    later = [np.corrcoef(errors[:-50, axis], errors[50:, axis])[0, 1] for axis in range(3)]
+    np.testing.assert_allclose(later, np.exp(-1.0), atol=0.15)
+    # from one fix to the next the white part is what changes most
+    np.testing.assert_allclose(
+        np.diff(errors, axis=0).std(axis=0), np.sqrt(2.0) * np.hypot(white, slow * np.sqrt(1 - np.exp(-0.02))), rtol=0.1
+    )
+
+
 def test_lies_are_of_their_size_and_nowhere_else():
     honest = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(3), position_std=0.01)
     among = np.arange(50, 150)

@@ -60,7 +60,7 @@ def as_mounted(entry: ImuEntry) -> Imu:
         sensor_rotation(entry),
         np.array(entry.position_m),
         _initial_errors(entry.initial_errors),
-        _initial_std(entry.initial_std, noise_grade(entry.noise)),
+        initial_std(entry.initial_std, noise_grade(entry.noise)),
         wheel=None if entry.wheel is None else wheel(entry.wheel),
         module=entry.module,
         mount_std=entry.mount_std_deg * DEG,
@@ -152,7 +152,9 @@ def _initial_errors(errors: InitialErrors) -> ImuErrors:
     )
 
 
-def _initial_std(std: InitialStd, noise: NoiseGrade) -> ImuErrors:
+def initial_std(std: InitialStd, noise: NoiseGrade) -> ImuErrors:
+    """Return in SI how sure the initial errors of an IMU of a grade are."""
+
     def of(given: tuple[float, float, float] | None, unit: float, otherwise: Array) -> Array:
         return otherwise if given is None else np.array(given) * unit
 

@@ -20,7 +20,7 @@ from polyins.reproduce.chips import Chips, parts_of
 from polyins.reproduce.pictures import bars, write_figure
 from polyins.reproduce.progress import Steps
 from polyins.simulation.error_scenario import Errors
-from polyins.simulation.run import TrueRun, record
+from polyins.simulation.run import TrueRun
 
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
 GROUPS = (1, 2, 3, 4)
@@ -28,8 +28,8 @@ QUICK_GROUPS = (1,)
 SEEDS = (0, 1, 2, 3)
 QUICK_SEEDS = (0,)
 """of sources and candidates"""
-EXACT_M = (1e-4, 1e-4, 1e-4)
-"""std of fixes that take nothing from the gain"""
+EXACT_M, NOTHING = (1e-4, 1e-4, 1e-4), (0.0, 0.0, 0.0)
+"""m: std of fixes that take nothing from the gain"""
 
 PAPER = {
     "group1": (5.68, 1.98, 1.97, 2.05),
@@ -159,11 +159,9 @@ def add_sources(
 ) -> dict[str, dict[str, float]]:
     """Return single, eNav-Fusion, their ratio and what of the ratio each source takes, added one after the other."""
     known = rigid_array.with_errors(run, Errors(scales=errors.scales))
-    exact = _with_fixes(known, EXACT_M)
-    result = {"white noise and drift": _pooled(lambda seed: record(exact, seed=seed).recording, seeds, steps)}
-    result["errors of the fixes"] = _pooled(
-        lambda seed: rigid_array.with_real_fixes(record(known, seed=seed).recording, seed), seeds, steps
-    )
+    exact = _with_fixes(known, position_std_m=EXACT_M, slow_std_m=NOTHING, stated_std_m=EXACT_M)
+    result = {"white noise and drift": _pooled(partial(_recording_of_known_chips, exact), seeds, steps)}
+    result["errors of the fixes"] = _pooled(partial(_recording_of_known_chips, known), seeds, steps)
     given = errors.model_dump()
     for name, part in parts_of(chips).items():
         known = with_chips(run, known.scenario.errors, part)
@@ -186,10 +184,11 @@ def try_candidates(
         name: partial(rigid_array.recording_of, _changed(own, sizes)) for name, sizes in CANDIDATES.items()
     }
     plain, sensitive = partial(rigid_array.recording_of, own), makers["g-sensitivity"]
-    makers[UNAWARE] = lambda seed: _unaware(plain(seed))
-    makers[f"g-sensitivity, and {UNAWARE}"] = lambda seed: _unaware(sensitive(seed))
-    north, east, down = rigid_array.STATED_STD.tolist()
-    makers[STATED] = partial(rigid_array.recording_of, _with_fixes(own, (north, east, down)))
+    makers[UNAWARE] = lambda seed: rigid_array.unaware(plain(seed))
+    makers[f"g-sensitivity, and {UNAWARE}"] = lambda seed: rigid_array.unaware(sensitive(seed))
+    assert run.scenario.gnss is not None
+    as_stated = _with_fixes(own, position_std_m=run.scenario.gnss.stated_std_m)
+    makers[STATED] = partial(rigid_array.recording_of, as_stated)
     makers[LATE] = lambda seed: _late(plain(seed), run.path.static)
     return {name: _pooled(make, seeds, steps) for name, make in makers.items()}
 
@@ -211,16 +210,14 @@ def _pooled(make: Callable[[int], Recording], seeds: Sequence[int], steps: Steps
     return {**row, "ratio": row["single"] / row["enav-fusion"]}
 
 
-def _unaware(recording: Recording) -> Recording:
-    """Return the recording for a filter whose first std are those of the drift."""
-    imus = tuple(replace(imu, initial_std=None) for imu in recording.rig.imus)
-    return replace(recording, rig=replace(recording.rig, imus=imus))
+def _recording_of_known_chips(run: TrueRun, seed: int) -> Recording:
+    return rigid_array.unaware(rigid_array.recording_of(run, seed))
 
 
-def _with_fixes(run: TrueRun, std: tuple[float, float, float]) -> TrueRun:
-    """Return the run with fixes of another white noise, m north, east, down."""
+def _with_fixes(run: TrueRun, **keys: Any) -> TrueRun:
+    """Return the run with other errors of its fixes."""
     assert run.scenario.gnss is not None
-    receiver = run.scenario.gnss.model_copy(update={"position_std_m": std})
+    receiver = run.scenario.gnss.model_copy(update=keys)
     return replace(run, scenario=run.scenario.model_copy(update={"gnss": receiver}))
 
 

@@ -6,7 +6,7 @@ experiments.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -33,7 +33,7 @@ from polyins.reproduce.robot import (
 from polyins.reproduce.robot_experiments import EXPERIMENTS, Experiment, World, truth
 from polyins.reproduce.sites import Site, site
 from polyins.reproduce.vehicles import CAR, ROBOT
-from polyins.simulation.run import record
+from polyins.simulation.run import TrueRun, record
 from polyins.simulation.scenario import Errors
 
 SEEDS = 5
@@ -42,6 +42,7 @@ PREDICTIONS = {"window": "base, window", "end": "base"}
 """experiments, by what the wheel speed is compared with"""
 ERROR_FREE = Errors(noise=False, biases=False, scales=False)
 ONE_SAMPLE_S = 0.005
+WHEELS, WITH_BODY = ("wheel-ins/left1", "wheel-ins/right1"), ("triple-ins/left1/right1/body1",)
 
 PAPER = {
     "wheel-ins": row(0.95, 0.24, 3.09, 0.99),
@@ -60,10 +61,12 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     robot, car = site(ROBOT, quick), site(CAR, quick)
     seeds, car_seeds = (range(1), range(1)) if quick else (range(SEEDS), range(CAR_SEEDS))
     configurations, experiments = (FEW, {}) if quick else (CONFIGURATIONS, EXPERIMENTS)
-    worlds: tuple[World, ...] = ("plane",) if quick else ("plane", "turning")
-    steps = Steps(progress, len(PREDICTIONS) * (len(seeds) + len(car_seeds)) + len(worlds) + 1 + len(experiments))
-    error_free = {f"robot, {world}": error_free_run(robot, world, steps.next()) for world in worlds}
-    error_free["car, plane"] = error_free_run(car, "plane", steps.next())
+    exact = error_free_runs(robot, car, quick)
+    steps = Steps(progress, len(PREDICTIONS) * (len(seeds) + len(car_seeds)) + len(exact) + len(experiments))
+    error_free = {
+        name: error_free_run(truth(place, world), labels, steps.next())
+        for name, (place, world, labels) in exact.items()
+    }
     tables = {key: _scores(name, robot, seeds, configurations, steps) for key, name in PREDICTIONS.items()}
     on_car = {key: table(_scores(name, car, car_seeds, FEW, steps)) for key, name in PREDICTIONS.items()}
     found = {name: run_experiment(experiment, robot, steps.next()) for name, experiment in experiments.items()}
@@ -94,9 +97,26 @@ def _scores(
     return [score_all(EXPERIMENTS[experiment].recording(place, seed), configurations, steps.next()) for seed in seeds]
 
 
-def error_free_run(place: Site, world: World, progress: Callable[[float], None] = lambda _: None) -> dict[str, float]:
-    """Return the greatest horizontal error, m, of Wheel-INS on each wheel without any errors of the chips."""
-    run = truth(place, world)
+def error_free_runs(robot: Site, car: Site, quick: bool) -> dict[str, tuple[Site, World, Sequence[str]]]:
+    """Return where the runs without errors are, and of which systems; `quick` has fewer."""
+    few: dict[str, tuple[Site, World, Sequence[str]]] = {
+        "robot, plane": (robot, "plane", WHEELS),
+        "car, plane": (car, "plane", WHEELS),
+    }
+    if quick:
+        return few
+    return {
+        **few,
+        "robot, level": (robot, "level", WHEELS),
+        "robot, turning": (robot, "turning", WHEELS),
+        "robot, plane, with the body": (robot, "plane", WITH_BODY),
+    }
+
+
+def error_free_run(
+    run: TrueRun, labels: Sequence[str], progress: Callable[[float], None] = lambda _: None
+) -> dict[str, float]:
+    """Return the greatest horizontal error, m, of the worst of several systems without any errors of the chips."""
     scenario = run.scenario.model_copy(update={"errors": ERROR_FREE})
     recording = record(replace(run, scenario=scenario), seed=0).recording
     rows = {
@@ -104,7 +124,6 @@ def error_free_run(place: Site, world: World, progress: Callable[[float], None] 
         for prediction in PREDICTIONS
         for window in (WINDOW, ONE_SAMPLE_S)
     }
-    labels = [f"wheel-ins/{side}1" for side in ("left", "right")]
     found = {name: max(_horizontal_max(changed, label) for label in labels) for name, changed in rows.items()}
     progress(1.0)
     return found
@@ -130,7 +149,6 @@ def _settings(configurations: Configurations, experiments: dict[str, Experiment]
             "runs": {name: len(labels) for name, labels in configurations.items()},
             "runs of the car and the experiments": {name: len(labels) for name, labels in FEW.items()},
             "scenarios": {vehicle.name: vehicle.base.model_dump(mode="json") for vehicle in (ROBOT, CAR)},
-            "stand-ins": {vehicle.name: asdict(vehicle.stand_in) for vehicle in (ROBOT, CAR)},
             "rolling": {**asdict(RollingOptions()), "standstill": False},
             "experiments": {name: experiment.source for name, experiment in experiments.items()},
             "experiment_seeds": {name: experiment.seeds for name, experiment in experiments.items()},

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,16 +67,10 @@ def with_books(scenario: Scenario, thickest_mm: float) -> Scenario:
     return with_road(scenario, books=tuple(books))
 
 
-def with_books_in_order(scenario: Scenario) -> Scenario:
-    """Return the scenario with the thinnest book first, the thickest last, and every third under the right wheels."""
+def with_books_under(scenario: Scenario, side: Literal["left", "right", "both"]) -> Scenario:
+    """Return the scenario with all books under the same wheels."""
     assert scenario.road is not None
-    books = scenario.road.books
-    heights = sorted(book.height_m for book in books)
-    sides = ("left", "left", "right") * (len(books) // 3)
-    laid = zip(books, heights, sides, strict=True)
-    return with_road(
-        scenario, books=tuple(book.model_copy(update={"height_m": h, "under": side}) for book, h, side in laid)
-    )
+    return with_road(scenario, books=tuple(book.model_copy(update={"under": side}) for book in scenario.road.books))
 
 
 def with_books_reversed(scenario: Scenario) -> Scenario:

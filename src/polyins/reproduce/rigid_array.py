@@ -13,12 +13,10 @@ from polyins import batch, datasets
 from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
 from polyins.evaluation.outages import outage_statistic
-from polyins.geodesy import metres_per_unit
 from polyins.recording import Recording
 from polyins.reproduce.chips import Chips, compensate, draw_chips, read_chips
-from polyins.rig import DEG, PPM, ImuErrors
+from polyins.rig import DEG
 from polyins.simulation.error_scenario import Errors
-from polyins.simulation.imu_errors import gauss_markov
 from polyins.simulation.increments import increments
 from polyins.simulation.path import Path
 from polyins.simulation.replay import replay
@@ -32,20 +30,6 @@ FIRST, LAST = 270769.0, 273689.0
 """s of week: 60 s before the car first moves, and the end of the last outage"""
 QUICK_S = 1300.0
 QUICK_RATE_HZ = 20.0
-
-INITIAL_STD = ImuErrors(
-    gyro_bias=np.full(3, 50.0 / 3600.0 * DEG),
-    accel_bias=np.full(3, 0.1),
-    gyro_scale=np.full(3, 2000.0 * PPM),
-    accel_scale=np.full(3, 1000.0 * PPM),
-)
-"""What the filter is told of uncompensated chips at the start: the spread of Group 1's; gyro biases are estimated at
-standstill."""
-
-SLOW_STD, SLOW_TIME = np.array([0.006, 0.004, 0.013]), 60.0
-"""m north, east, down, and s: the slow part of the real positions while the car stands"""
-STATED_STD = np.array([0.013, 0.010, 0.023])
-"""m: median of what the real positions state"""
 
 
 def base_scenario(quick: bool) -> Scenario:
@@ -110,32 +94,20 @@ def group_chips(number: int, count: int) -> Chips:
 
 
 def recording_of(run: TrueRun, seed: int) -> Recording:
-    """Return a recording with fixes like the real ones, whose filter knows how far chips may be off at the start."""
-    return with_real_fixes(with_unknown_chips(record(run, seed=seed).recording), seed)
+    """Return a recording with errors that the seed draws."""
+    return record(run, seed=seed).recording
 
 
-def with_unknown_chips(recording: Recording) -> Recording:
-    """Return the recording for a filter that is told `INITIAL_STD`."""
-    imus = tuple(replace(imu, initial_std=INITIAL_STD) for imu in recording.rig.imus)
+def unaware(recording: Recording) -> Recording:
+    """Return the recording for a filter that is told nothing of the chips but their noise."""
+    imus = tuple(replace(imu, initial_std=None) for imu in recording.rig.imus)
     return replace(recording, rig=replace(recording.rig, imus=imus))
-
-
-def with_real_fixes(recording: Recording, seed: int) -> Recording:
-    """Return the recording with the slow errors, and the stated std, of the real fixes besides their white noise."""
-    fixes = recording.gnss
-    assert fixes is not None
-    interval = float(np.median(np.diff(fixes.time)))
-    drift = gauss_markov(len(fixes.time), interval / SLOW_TIME, np.random.default_rng([seed, 60]))
-    position = fixes.position + SLOW_STD * drift[:, :3] / metres_per_unit(fixes.position, geodetic=True)
-    stated = np.broadcast_to(STATED_STD, position.shape).copy()
-    return replace(recording, gnss=replace(fixes, position=position, position_std=stated))
 
 
 def compensated(recording: Recording, chips: Chips) -> Recording:
     """Return the recording with every chip's calibration applied."""
-    imus = tuple(replace(imu, initial_std=None) for imu in recording.rig.imus)
     streams = tuple(compensate(stream, chip) for stream, chip in zip(recording.imus, chips, strict=True))
-    return replace(recording, rig=replace(recording.rig, imus=imus), imus=streams)
+    return replace(unaware(recording), imus=streams)
 
 
 def maxima(recording: Recording, method: str, *, imu: int = 0) -> Array:

@@ -21,14 +21,12 @@ from polyins.reproduce.sites import Site
 from polyins.reproduce.vehicles import CHIPS, FILTER_NOISE, GYRO_SCALE_PPM, PRINTED_GYRO_SCALE_PPM, ROBOT
 from polyins.rig import DEG, Imu, Wheel
 from polyins.simulation import earth
-from polyins.simulation.ground import without_twist
 from polyins.simulation.run import TrueRun, record, true_run
 from polyins.simulation.scenario import Errors
-from polyins.simulation.track import Course, Waves
 from polyins.simulation.wheel_scenario import Slip
 
 Array = NDArray[np.float64]
-World = Literal["plane", "turning", "slip", "slopes"]
+World = Literal["plane", "turning", "slip", "level"]
 
 CONSTANT = ROBOT.base.errors
 DRIFTING = Errors(turn_on_share=1.0 - (25.0 / 200.0) ** 2)
@@ -42,8 +40,6 @@ HEADING_ERROR = 0.5 * DEG
 TILT = 0.5 * DEG
 CLOCK_ERROR_S = 0.005
 SLIP = Slip(size=0.2, length_s=1.0, every_s=30.0)
-SLOPE = 1.5 * DEG
-SLOPE_LENGTH_M = 60.0
 FIELD_SEEDS = 3
 
 
@@ -82,18 +78,11 @@ def _drawn(site: Site, world: World, errors: Errors, noise: Noise, filter_noise:
 @lru_cache(maxsize=4)
 def truth(site: Site, world: World = "plane") -> TrueRun:
     """Return the error-free run of a site's vehicle in a world."""
-    if world == "slopes":
-        return _over_slopes(truth(site, "plane"))
+    if world == "level":
+        return true_run(site.scenario(level=True))
     if world == "slip":
-        return site.vehicle.drive(site.scenario(slip=SLIP))
-    return site.vehicle.drive(site.scenario(earth=world))
-
-
-def _over_slopes(run: TrueRun) -> TrueRun:
-    """Return the run over waves of the ground, with roll as the ground has it."""
-    assert isinstance(run.path.heading, Course)
-    waves = Waves(run.path.heading.distance, SLOPE, SLOPE_LENGTH_M)
-    return true_run(run.scenario, without_twist(replace(run.path, pitch=waves)))
+        return true_run(site.scenario(slip=SLIP))
+    return true_run(site.scenario(earth=world))
 
 
 def without_earth_rate(recording: Recording) -> Recording:
@@ -228,7 +217,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         errors=CONSTANT.model_copy(update={"misalignment_deg": CHIP_MISALIGNMENT_DEG}),
     ),
     "slip": Experiment("up to 20 % for 1 s, every 30 s, each wheel; plausible, not published", world="slip"),
-    "slopes": Experiment("pitch and roll within +-1.5 deg, waves of 60 m; plausible for a campus", world="slopes"),
+    "level ground": Experiment("no slopes; the robot's scenario has some", world="level"),
     "gyro scale 0.005": Experiment(
         "half of the 1 % that the chip's data sheet allows", noise=grade(CHIPS, gyro_scale_ppm=LOW_SCALE_PPM)
     ),

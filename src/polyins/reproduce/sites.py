@@ -33,9 +33,9 @@ class Site:
             return f"real, data set {self.vehicle.dataset}; {drive}"
         return f"synthetic laps stand in: the data set {self.vehicle.dataset} is not at hand; {drive}"
 
-    def scenario(self, *, earth: Earth | None = None, slip: Slip | None = None) -> Scenario:
+    def scenario(self, *, level: bool = False, earth: Earth | None = None, slip: Slip | None = None) -> Scenario:
         """Return the vehicle's scenario here."""
-        return self.vehicle.scenario(self.folder, earth=earth, slip=slip, duration_s=self.duration_s)
+        return self.vehicle.scenario(self.folder, level=level, earth=earth, slip=slip, duration_s=self.duration_s)
 
 
 def site(vehicle: Vehicle, quick: bool = False) -> Site:

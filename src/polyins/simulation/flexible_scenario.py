@@ -154,6 +154,8 @@ class Road(Section):
     """std of the logarithm of that size, whose median is `roughness_mm`"""
     books: tuple[Book, ...] = ()
     """on every straight"""
+    books_shuffled: bool = False
+    """the seed lays them in another order, and draws which of them is under which wheels"""
     wheelbase_m: Positive = 0.45
     """m"""
     track_m: Positive = 0.40
@@ -190,6 +192,7 @@ class Road(Section):
 
     def ground(self, path: Path, straight_begins: Sequence[float] | Array, rng: np.random.Generator) -> Ground:
         """Draw the ground along a path whose straights begin after the given ways, m."""
+        books = self._shuffled(rng) if self.books_shuffled else self.books
         shortest, longest = self.wavelengths_m
         roughness = Roughness(
             self.roughness_mm * 1e-3, shortest, longest, self.correlation, self.patch_length_m, self.patch_sigma
@@ -197,7 +200,16 @@ class Road(Section):
         bumps = [
             Bump(begin + book.at_m, book.length_m, book.height_m, book.under != "right", book.under != "left")
             for begin in straight_begins
-            for book in self.books
+            for book in books
         ]
         length = float(way(path, np.linspace(0.0, path.duration, int(path.duration * 100.0) + 1))[-1])
         return ground(length, roughness, bumps, Wheel(self.wheel_radius_m, self.envelope_m), rng)
+
+    def _shuffled(self, rng: np.random.Generator) -> tuple[Book, ...]:
+        """Return the books, each at the place of another one and under the wheels of a third one."""
+        count = len(self.books)
+        laid = zip(self.books, rng.permutation(count), rng.permutation(count), strict=True)
+        return tuple(
+            book.model_copy(update={"at_m": self.books[place].at_m, "under": self.books[side].under})
+            for book, place, side in laid
+        )

@@ -80,14 +80,14 @@ class Simulation:
     """in the order of the scenario's"""
 
 
-def true_run(scenario: Scenario, path: Path | None = None) -> TrueRun:
+def true_run(scenario: Scenario) -> TrueRun:
     """Return the truth of a scenario: its path, its wheels, and what error-free IMUs put out.
 
-    `path`, in the scenario's world, takes the place of its own. Raises InputError for a scenario that cannot be.
+    Raises InputError for a scenario that cannot be.
     """
     seed = scenario.seed if scenario.path_seed is None else scenario.path_seed
     drive_seed, _, _, wheel_seed, ground_seed = np.random.SeedSequence(seed).spawn(5)
-    path = _path(scenario, drive_seed) if path is None else _shortened(path, scenario)
+    path = _path(scenario, drive_seed)
     fitted = _fitted(scenario.model_copy(update={"path_seed": seed}), path)
     wheels = tuple(
         wheel.rolls(path, np.random.default_rng(own_seed))
@@ -161,9 +161,9 @@ def checked(seed: int) -> int:
 
 def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
     start, world = scenario.start_position(), scenario.world()
-    if scenario.track:
-        path = scenario.track.path(scenario.static_s, start, world)
-        uneven = scenario.wheels and scenario.track.slope_deg
+    if way := scenario.track or scenario.laps:
+        path = way.path(scenario.static_s, start, world)
+        uneven = scenario.wheels and way.slope_deg
         return _shortened(without_twist(path) if uneven else path, scenario)
     if scenario.replay:
         return _shortened(scenario.replay.path(int(seed.generate_state(1)[0])), scenario)
@@ -267,6 +267,9 @@ def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[
         receiver.antenna_position_m,
         rng=rng,
         position_std=receiver.position_std_m,
+        slow_std=receiver.slow_std_m,
+        slow_time=receiver.slow_time_s,
+        stated_std=receiver.stated_std_m,
         velocity_std=receiver.velocity_std_m_s,
         rate_hz=receiver.rate_hz,
         phase=receiver.phase_s,

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from polyins.config import (
+    InitialStd,
     Noise,
     NotNegative,
     Outages,
     OutageSchedule,
     Positive,
+    PositiveSpread,
     Section,
     Spread,
     StartPosition,
@@ -25,7 +27,7 @@ from polyins.config import (
 )
 from polyins.config.fields import blame
 from polyins.io.checks import axes_matrix
-from polyins.io.imu_stream import noise_grade
+from polyins.io.imu_stream import initial_std, noise_grade
 from polyins.io.yaml_document import read_yaml
 from polyins.recording import FilterOptions, Recording
 from polyins.rig import DEG, Imu, Rig
@@ -36,7 +38,7 @@ from polyins.simulation.path import START, TOP_SPEED, World
 from polyins.simulation.plane import Plane
 from polyins.simulation.replay_scenario import Replay
 from polyins.simulation.run import Simulation, checked, record, true_run
-from polyins.simulation.wheel_scenario import Track, WheelModule
+from polyins.simulation.wheel_scenario import Laps, Track, WheelModule
 
 Array = NDArray[np.float64]
 
@@ -92,6 +94,12 @@ class Fixes(Section):
     """of the antenna from the array origin: forward, right, down, m"""
     position_std_m: Spread = (0.02, 0.02, 0.04)
     """of the white noise, north, east, down, m"""
+    slow_std_m: Spread = (0.0, 0.0, 0.0)
+    """of an error that wanders, north, east, down, m; RTK in the open 0.005 to 0.02"""
+    slow_time_s: Positive = 60.0
+    """its correlation time, s"""
+    stated_std_m: PositiveSpread | None = None
+    """what the fixes claim, north, east, down, m; without it the white noise's"""
     velocity_std_m_s: Spread | None = None
     """of the velocity's noise, north, east, down, m/s; without it there are no velocities"""
     lies: Lies = Lies()
@@ -108,7 +116,7 @@ class Scenario(Section):
     path_seed: Annotated[int, Field(ge=0, strict=True)] | None = None
     """of the drive and the wheels' slip, where they are to stay while seed draws other errors; without it seed"""
     duration_s: Positive = 1000.0
-    """the standing start included, s; a track or a replay is driven to its end unless this is given"""
+    """the standing start included, s; a track, laps or a replay are driven to their end unless this is given"""
     static_s: NotNegative = 60.0
     """length of the standing start, s"""
     earth: Literal["turning", "plane"] = "turning"
@@ -121,6 +129,8 @@ class Scenario(Section):
     """of the drive, m/s; a robot's is about 2"""
     track: Track | None = None
     """a surveyed track instead of a drive"""
+    laps: Laps | None = None
+    """laps of a rectangle instead of a drive; their length is their own"""
     replay: Replay | None = None
     """a surveyed drive, driven again, instead of one of its own; its length and its standing start are its own"""
     shuttle: Shuttle | None = None
@@ -139,6 +149,8 @@ class Scenario(Section):
     """how good the IMUs are: a mapping, or just the name of a grade"""
     filter_noise: Noise | None = None
     """how good the configuration says they are; without it as good as they are"""
+    initial_std: InitialStd | None = None
+    """how far off the configuration says they may be at the start; without it as far as noise and errors have it"""
     errors: Errors = Errors()
     """which errors they have"""
     gnss: Fixes | None = Fixes()
@@ -150,7 +162,7 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _fits_its_duration(self) -> Self:
-        whole = (self.track or self.replay) and not self.limited
+        whole = (self.track or self.laps or self.replay) and not self.limited
         longest = math.inf if whole else self.duration_s
         inside = "expected within the drive" if whole else f"expected within the {longest:g} s of duration_s"
         if self.static_s >= longest and not self.replay:
@@ -175,7 +187,7 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _mounts_and_ground_fit(self) -> Self:
-        ways = [name for name in ("track", "replay", "shuttle") if getattr(self, name)]
+        ways = [name for name in ("track", "laps", "replay", "shuttle") if getattr(self, name)]
         if len(ways) > 1:
             raise blame(ways[-1], f"is given with a {ways[0]}; expected one of them")
         if self.replay and self.earth != "turning":
@@ -231,7 +243,8 @@ class Scenario(Section):
                 for index, position in enumerate(self.imus.positions())
             ]
         imus += [imu for wheel in self.wheels for imu in wheel.imus(grade)]
-        imus = [replace(imu, initial_std=self.errors.start_std(grade)) for imu in imus]
+        std = self.errors.start_std(grade) if self.initial_std is None else initial_std(self.initial_std, grade)
+        imus = [replace(imu, initial_std=std) for imu in imus]
         return Rig(tuple(imus), np.array(self.gnss.antenna_position_m if self.gnss else (0.0, 0.0, 0.0)))
 
     def outage_intervals(self) -> tuple[tuple[float, float], ...]:

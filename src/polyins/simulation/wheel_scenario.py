@@ -1,18 +1,20 @@
-"""What a scenario may say of wheels, and of a surveyed track to roll along."""
+"""What a scenario may say of wheels, and of a surveyed track or laps to roll along."""
 
 from __future__ import annotations
 
 import re
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from polyins.config import NotNegative, Number, Positive, Section, Triple
+from polyins.config.fields import blame
 from polyins.io.columns import column_names, read_columns
 from polyins.rig import DEG, Imu, NoiseGrade, Wheel
 from polyins.simulation import earth
+from polyins.simulation.laps import lap_length, lap_points, lap_speeds
 from polyins.simulation.path import Path, World
 from polyins.simulation.rolling import RollingWheel, roll
 from polyins.simulation.slip import slip_periods
@@ -79,7 +81,16 @@ class WheelModule(Section):
         return roll(path, self.position_m, self.radius_m, phase=phase, slip=share)
 
 
-class Track(Section):
+class Terrain(Section):
+    """The ground along a way: level unless slopes are asked for."""
+
+    slope_deg: Annotated[Number, Field(ge=0.0, le=5.0)] = 0.0
+    """the steepest slope of ground in waves, deg; with wheels it does not twist: it rolls, short waves are flatter"""
+    slope_length_m: Positive = 60.0
+    """of a wave of the ground, m"""
+
+
+class Track(Terrain):
     """A surveyed track and the speeds at which it is travelled; the ground is level unless slopes are asked for."""
 
     file: str
@@ -90,10 +101,6 @@ class Track(Section):
     """bends much shorter than this are smoothed away, m"""
     rest_s: NotNegative = 5.0
     """standing at the end, s"""
-    slope_deg: Annotated[Number, Field(ge=0.0, le=5.0)] = 0.0
-    """the steepest slope of ground in waves, deg; with wheels it does not twist: it rolls, short waves are flatter"""
-    slope_length_m: Positive = 60.0
-    """of a wave of the ground, m"""
 
     def path(self, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path along the track; raises InputError for files that give none."""
@@ -122,3 +129,45 @@ class Track(Section):
         meridian, transverse = earth.radii(np.array([[latitude[0] * DEG, 0.0, 0.0]]))
         east = (longitude - longitude[0]) * DEG * transverse * np.cos(latitude[0] * DEG)
         return (latitude - latitude[0]) * DEG * meridian, east
+
+
+class Laps(Terrain):
+    """Laps of a rectangle with round corners, counterclockwise, at a speed that goes up and down."""
+
+    length_m: Positive = 100.0
+    """of the rectangle, m"""
+    width_m: Positive = 30.0
+    """m"""
+    corner_m: Positive = 3.0
+    """radius of the corners, m"""
+    count: Annotated[int, Field(ge=1, strict=True)] = 1
+    """how many laps"""
+    speed_m_s: Positive = 1.4
+    """mean, m/s"""
+    change_m_s: NotNegative = 0.0
+    """by which the speed goes up and down about its mean, m/s"""
+
+    @model_validator(mode="after")
+    def _can_be_driven(self) -> Self:
+        if 2.0 * self.corner_m > min(self.length_m, self.width_m):
+            raise blame("corner_m", f"is {self.corner_m:g}; expected at most half of length_m and of width_m")
+        if self.change_m_s >= self.speed_m_s:
+            raise blame("change_m_s", f"is {self.change_m_s:g}; expected less than the {self.speed_m_s:g} of speed_m_s")
+        return self
+
+    def path(self, static: float, start: ArrayLike, world: World) -> Path:
+        """Return the path around; it begins and ends at rest."""
+        north, east = lap_points(self.length_m, self.width_m, self.corner_m, self.count)
+        way = lap_length(self.length_m, self.width_m, self.corner_m) * self.count
+        time, speed = lap_speeds(way, self.speed_m_s, self.change_m_s)
+        return track_path(
+            north,
+            east,
+            time,
+            speed,
+            static=static,
+            steepest=self.slope_deg * DEG,
+            wave=self.slope_length_m,
+            start=start,
+            world=world,
+        )
