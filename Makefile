@@ -1,7 +1,7 @@
 VENV := .venv
 PYTHON ?= python3
 BIN := $(VENV)/bin
-PICTURES := a3-sources a5=a5-book,a5-roughness,a5-thickness afig3=afig3-std,afig3-imus,afig3-common afig6-tracks \
+PICTURES := a3-sources a5=a5-length,a5-book,a5-roughness,a5-thickness afig3=afig3-std,afig3-imus,afig3-common afig6-tracks \
 	afig7=afig7-gyro,afig7-accelerometer afig8-errors bfig7-9=bfig7,bfig8,bfig9 bfig10 split-imus
 
 .PHONY: demo test lint types bench live-flood reproduce pictures clean

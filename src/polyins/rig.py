@@ -93,6 +93,10 @@ class NoiseGrade:
         """Return the standard deviations of the twelve slow errors in the order of the filter's states, (12,)."""
         return np.concatenate([self.gyro_bias_std, self.accel_bias_std, self.gyro_scale_std, self.accel_scale_std])
 
+    def slow_std(self) -> ImuErrors:
+        """Return the same by kind."""
+        return ImuErrors(self.gyro_bias_std, self.accel_bias_std, self.gyro_scale_std, self.accel_scale_std)
+
     @classmethod
     def typical(cls, grades: Sequence[NoiseGrade]) -> NoiseGrade:
         """Return the grade that stands for several: the means of what drives and what damps their errors."""

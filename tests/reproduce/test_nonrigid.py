@@ -12,7 +12,10 @@ from polyins.reproduce import a5, a6, nonrigid
 from polyins.reproduce.feedback import outage_maxima
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.rigid_array import Array, maxima
+from polyins.simulation.flexible import flex
+from polyins.simulation.flexible_scenario import Book
 from polyins.simulation.scenario import Scenario
+from polyins.simulation.shaking import shake
 
 SECONDS = 150.0
 
@@ -90,6 +93,20 @@ def test_figures_are_pooled_over_all_outages_of_all_seeds() -> None:
     assert nonrigid.pooled(maxima_by_seed)["single"] == pytest.approx(np.sqrt(50.0 / 4.0))
 
 
+def test_the_interval_of_a_ratio_holds_it_and_is_nothing_where_all_seeds_agree() -> None:
+    rng = np.random.default_rng(0)
+    same = {"single": np.full(5, 4.0), "imu-fusion": np.full(5, 3.0), "nav-fusion": np.full(5, 2.0)}
+    runs = [{**same, a5.OWN_RATES: np.abs(rng.normal(0.0, 3.0, 5))} for _ in range(60)]
+    found = a5.interval(runs)
+    assert found["imu_fusion_over_single"] == pytest.approx([0.75, 0.75])
+    assert found["imu_fusion_over_nav_fusion"] == pytest.approx([1.5, 1.5])
+    own = a5.row(runs)[a5.OWN_RATES] / 4.0
+    low, high = found["own_rates_over_single"]
+    # of 300 values of which the square's std is sqrt(2) of its mean: 1.64 sqrt(2 / 300) / 2
+    assert low < own < high
+    assert (high - low) / own == pytest.approx(0.134, rel=0.2)
+
+
 def test_the_documents_name_the_paper_s_figures_and_ours_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     errors = {"single": 6.0, "imu-fusion": 5.0, a5.OWN_RATES: 5.5, "nav-fusion": 2.5, "enav-fusion": 2.0}
     runs = [{name: np.array([error]) for name, error in errors.items()}]
@@ -139,7 +156,7 @@ def test_what_is_swept_is_all_that_changes() -> None:
 
 def test_books_are_laid_in_another_order_and_stay_the_same_books() -> None:
     own = nonrigid.scenario_of("test B", quick=True)
-    back, left = nonrigid.with_books_reversed(own).road, nonrigid.with_books_under(own, "left").road
+    back, left = nonrigid.with_books_reversed(own).road, nonrigid.with_books_on_the_left(own).road
     assert own.road is not None
     assert back is not None
     assert left is not None
@@ -148,6 +165,34 @@ def test_books_are_laid_in_another_order_and_stay_the_same_books() -> None:
     assert [book.at_m for book in back.books] == [book.at_m for book in books]
     assert left.books == tuple(book.model_copy(update={"under": "left"}) for book in books)
     assert sorted(book.height_m for book in books) == [book.height_m for book in books]
+
+
+def test_the_two_edges_of_a_book_cancel_or_add_up_in_the_slackest_ruler() -> None:
+    slackest = ringing(1.5), ringing(2.0), ringing(2.5)
+    # left, under which the book lies: most of what the edges set going
+    assert min(slackest[0][1], slackest[2][1]) > 5.0 * slackest[1][1]
+    for rulers in (slackest[0], slackest[2]):
+        assert rulers.argmax() == 1
+        assert max(rulers[2:]) < 0.4 * rulers[1]
+
+
+def ringing(periods: float) -> Array:
+    """Return the std of the rulers' deflections after a book whose edges are some periods of the slackest apart."""
+    scenario = nonrigid.with_roughness(nonrigid.scenario_of("test B", quick=True), 0.0)
+    assert scenario.rulers is not None
+    assert scenario.road is not None
+    assert scenario.shuttle is not None
+    rulers, speed, at, static = scenario.rulers.rulers(), scenario.shuttle.speed_m_s, 4.0, 1.0
+    length = periods * speed * 2.0 * np.pi / rulers[0].bending_rate
+    assert length == pytest.approx(0.21, abs=0.002) or periods != 2.0
+    book = Book(at_m=at, height_m=0.01, length_m=length, under="left")
+    road = scenario.road.model_copy(update={"books": (book,)})
+    path = scenario.shuttle.path(15.0, static, scenario.start_position(), scenario.world())
+    begins, ways = scenario.shuttle.straights(15.0, static)
+    shaking = shake(path, road.ground(path, ways[:1], np.random.default_rng(0)), road.suspension(), 5e-4)
+    left = begins[0] + (at + length + road.wheelbase_m / 2.0) / speed + 0.3
+    rows = slice(int(left / 5e-4), int((left + 1.0) / 5e-4))
+    return np.array([flex(ruler, shaking, 9.8)[rows, 0].std() for ruler in rulers])
 
 
 def test_what_diverges_beyond_all_numbers_has_no_figure(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,11 +46,13 @@ def test_outages_begin_when_the_front_wheels_reach_the_first_book():
 
 
 def test_the_seed_shuffles_the_books_if_it_is_asked_to(monkeypatch):
-    laid = []
+    laid, bare = [], []
 
     def noted(length, roughness, bumps, wheel, rng):
         laid.append(bumps)
-        return ground(length, roughness, bumps, wheel, rng)
+        drawn = ground(length, roughness, bumps, wheel, rng)
+        bare.append(drawn(np.linspace(0.0, min(bump.begin for bump in bumps) - 1.0, 50)))
+        return drawn
 
     monkeypatch.setattr(flexible_scenario, "ground", noted)
     scenario = nonrigid.scenario_of("test B", quick=True).model_copy(update={"duration_s": 90.0, "outages": ()})
@@ -59,6 +61,9 @@ def test_the_seed_shuffles_the_books_if_it_is_asked_to(monkeypatch):
         true_run(scenario.model_copy(update={"road": road, "seed": seed}))
     own, one, again, other = laid
     assert one == again
+    # it is the same ground that they lie on
+    np.testing.assert_array_equal(bare[0], bare[1])
+    assert np.abs(bare[1] - bare[3]).max() > 1e-4
     for key in (("begin",), ("height", "length"), ("left", "right")):
         sets = [sorted(tuple(getattr(bump, name) for name in key) for bump in bumps) for bumps in laid]
         assert sets[0] == sets[1] == sets[3], key
@@ -119,6 +124,10 @@ def test_the_reference_shakes_with_the_body():
         (
             "rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\nroad: {wavelengths_m: [3, 1]}",
             "wavelengths_m: are .3.0, 1.0.; expected the shortest",
+        ),
+        (
+            "rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\nroad: {books_shuffled: true}",
+            "road.books_shuffled: is true without books; expected some",
         ),
         ("errors: {g_sensitivity: 1}", "did you mean g_sensitivity_deg_s_g"),
     ],

@@ -176,7 +176,7 @@ def test_a_scenario_drives_again_what_was_surveyed(
 
 def test_a_scenario_refuses_what_cannot_be_driven_again(tmp_path: FilePath, fixes: tuple[Array, Array, Array]) -> None:
     for text, message in {
-        "shuttle: {}": "shuttle: is given with a replay",
+        "shuttle: {}": "shuttle: is given with replay",
         "start: {latitude_deg: 30, longitude_deg: 114}": "start: is given with a replay",
         "outages: [[90, 60]]": r"outages: \[90, 60\]; expected",
         "errors: {jitter_s: 0.1}": "errors.jitter_s is 0.1; expected",

@@ -6,6 +6,7 @@ from ruamel.yaml import YAML
 
 from polyins.config import Noise, OutageSchedule
 from polyins.errors import InputError
+from polyins.geodesy import metres_per_unit
 from polyins.simulation.increments import increments
 from polyins.simulation.scenario import (
     Board,
@@ -169,6 +170,35 @@ def test_examples_are_valid(example):
     scenario = read_scenario(example)
     assert scenario.outage_intervals()
     assert len(scenario.rig().imus) == scenario.imus.count
+
+
+def test_fixes_wander_and_claim_what_the_scenario_says(tmp_path):
+    file, errors = tmp_path / "scenario.yaml", []
+    for gnss in ("{position_std_m: 0.001}", "{position_std_m: 0.001, slow_std_m: [2, 0, 0], stated_std_m: [3, 2, 1]}"):
+        file.write_text(f"duration_s: 400\nrate_hz: 10\nimus: {{count: 1}}\noutages: []\ngnss: {gnss}\n")
+        simulation = simulate_with_truth(file)
+        stream, antenna = simulation.recording.gnss, simulation.recording.rig.antenna
+        truth = simulation.path.truth(stream.time, antenna).position
+        errors.append((stream.position - truth) * metres_per_unit(truth, geodetic=True))
+    np.testing.assert_array_equal(stream.position_std, np.tile([3.0, 2.0, 1.0], (len(stream.time), 1)))
+    plain, slow = errors
+    np.testing.assert_allclose(slow[:, 1:], plain[:, 1:], atol=1e-8)
+    assert 0.5 < slow[:, 0].std() < 4.0
+    # it wanders: within a minute, not from fix to fix
+    assert np.diff(slow[:, 0]).std() < 0.5 * slow[:, 0].std()
+
+
+def test_the_filter_is_told_the_initial_std_of_the_scenario(tmp_path):
+    file = tmp_path / "scenario.yaml"
+    file.write_text(
+        "noise: {gyro_bias_deg_h: 3, accel_scale_ppm: 70}\nerrors: {gyro_turn_on_deg_h: 4, accel_turn_on_mgal: 1000}\n"
+        "initial_std: {accel_bias_m_s2: 0.5, gyro_scale_ppm: [1, 2, 3]}\n"
+    )
+    std = read_scenario(file).rig().imus[-1].initial_std
+    np.testing.assert_allclose(np.degrees(std.gyro_bias) * 3600.0, 5.0)
+    np.testing.assert_allclose(std.accel_bias, 0.5)
+    np.testing.assert_allclose(std.gyro_scale, [1e-6, 2e-6, 3e-6])
+    np.testing.assert_allclose(std.accel_scale, 70e-6)
 
 
 def test_the_example_of_the_demonstration_is_the_demonstration():

@@ -60,7 +60,7 @@ def as_mounted(entry: ImuEntry) -> Imu:
         sensor_rotation(entry),
         np.array(entry.position_m),
         _initial_errors(entry.initial_errors),
-        initial_std(entry.initial_std, noise_grade(entry.noise)),
+        initial_std(entry.initial_std, noise_grade(entry.noise).slow_std()),
         wheel=None if entry.wheel is None else wheel(entry.wheel),
         module=entry.module,
         mount_std=entry.mount_std_deg * DEG,
@@ -152,15 +152,15 @@ def _initial_errors(errors: InitialErrors) -> ImuErrors:
     )
 
 
-def initial_std(std: InitialStd, noise: NoiseGrade) -> ImuErrors:
-    """Return in SI how sure the initial errors of an IMU of a grade are."""
+def initial_std(std: InitialStd, otherwise: ImuErrors) -> ImuErrors:
+    """Return in SI how sure the initial errors of an IMU are; `otherwise` has what is not given."""
 
-    def of(given: tuple[float, float, float] | None, unit: float, otherwise: Array) -> Array:
-        return otherwise if given is None else np.array(given) * unit
+    def of(given: tuple[float, float, float] | None, unit: float, own: Array) -> Array:
+        return own if given is None else np.array(given) * unit
 
     return ImuErrors(
-        of(std.gyro_bias_deg_s, DEG, noise.gyro_bias_std),
-        of(std.accel_bias_m_s2, 1.0, noise.accel_bias_std),
-        of(std.gyro_scale_ppm, PPM, noise.gyro_scale_std),
-        of(std.accel_scale_ppm, PPM, noise.accel_scale_std),
+        of(std.gyro_bias_deg_s, DEG, otherwise.gyro_bias),
+        of(std.accel_bias_m_s2, 1.0, otherwise.accel_bias),
+        of(std.gyro_scale_ppm, PPM, otherwise.gyro_scale),
+        of(std.accel_scale_ppm, PPM, otherwise.accel_scale),
     )

@@ -29,8 +29,13 @@ OWN_RATES = "imu-fusion, own rates"
 METHODS = ("imu-fusion", OWN_RATES, "nav-fusion", "enav-fusion")
 SEEDS = {"rigid": 10, "test A": 60, "test B": 60}
 QUICK_SEEDS = 1
-BLOCK = 20
-"""seeds"""
+BLOCK, DRAWS = 20, 2000
+"""seeds of a block; how often seeds are drawn again"""
+RATIOS = {
+    "imu_fusion_over_single": ("imu-fusion", "single"),
+    "imu_fusion_over_nav_fusion": ("imu-fusion", "nav-fusion"),
+    "own_rates_over_single": (OWN_RATES, "single"),
+}
 SWEPT = ("imu-fusion", "nav-fusion")
 """one IMU errs much the same whatever is varied"""
 
@@ -91,9 +96,7 @@ VARIANTS = {
     "books in drawn order": Variant(
         lambda scenario: nonrigid.with_road(scenario, books_shuffled=True), ("test B",), 60
     ),
-    "all books under the left wheels": Variant(
-        lambda scenario: nonrigid.with_books_under(scenario, "left"), ("test B",)
-    ),
+    "all books under the left wheels": Variant(nonrigid.with_books_on_the_left, ("test B",)),
 }
 
 Runs = list[dict[str, Array]]
@@ -125,7 +128,11 @@ def reproduce(
         "paper": {test: {**own, "ratio_to_rigid_single": _ratios(PAPER["rigid"], own)} for test, own in PAPER.items()},
         "polyins": {
             **{
-                test: {**with_ratios(own, tables["rigid"]), "by_block": by_block(runs[test])}
+                test: {
+                    **with_ratios(own, tables["rigid"]),
+                    "by_block": by_block(runs[test]),
+                    "90_percent_interval": interval(runs[test]),
+                }
                 for test, own in tables.items()
             },
             **sweeps,
@@ -188,9 +195,18 @@ def row(runs: Runs) -> dict[str, float]:
 def by_block(runs: Runs) -> dict[str, list[float]]:
     """Return the ratios of IMU-Fusion for each block of seeds by itself: how far they scatter."""
     rows = [row(runs[first : first + BLOCK]) for first in range(0, len(runs), BLOCK)]
+    return {name: [each[above] / each[below] for each in rows] for name, (above, below) in RATIOS.items()}
+
+
+def interval(runs: Runs) -> dict[str, list[float]]:
+    """Return where 90 % of the ratios of IMU-Fusion lie if as many seeds are drawn from these, some twice."""
+    squares = {name: np.array([np.mean(np.square(each[name])) for each in runs]) for name in runs[0]}
+    drawn = np.random.default_rng(0).integers(len(runs), size=(DRAWS, len(runs)))
     return {
-        "imu_fusion_over_single": [each["imu-fusion"] / each["single"] for each in rows],
-        "imu_fusion_over_nav_fusion": [each["imu-fusion"] / each["nav-fusion"] for each in rows],
+        name: np.percentile(
+            np.sqrt(squares[above][drawn].mean(axis=1) / squares[below][drawn].mean(axis=1)), (5.0, 95.0)
+        ).tolist()
+        for name, (above, below) in RATIOS.items()
     }
 
 

@@ -80,10 +80,12 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
             "predicted at the end": {**table(end), "by seed": by_seed(end)},
             "car": {**on_car["window"], "predicted at the end": on_car["end"]},
             "error-free horizontal_max_m": error_free,
+            "steepest_deg": {place.vehicle.name: steepest(truth(place)) for place in (robot, car)},
             "experiments": found,
         },
         "settings": {
             "tracks": {"robot": robot.source, "car": car.source},
+            "scenarios": {place.vehicle.name: _described(place) for place in (robot, car)},
             **_settings(configurations, experiments),
             "seeds": {"robot": len(seeds), "car": len(car_seeds)},
         },
@@ -108,6 +110,7 @@ def error_free_runs(robot: Site, car: Site, quick: bool) -> dict[str, tuple[Site
     return {
         **few,
         "robot, level": (robot, "level", WHEELS),
+        "car, level": (car, "level", WHEELS),
         "robot, turning": (robot, "turning", WHEELS),
         "robot, plane, with the body": (robot, "plane", WITH_BODY),
     }
@@ -129,6 +132,20 @@ def error_free_run(
     return found
 
 
+def steepest(run: TrueRun) -> dict[str, float]:
+    """Return the largest roll and pitch of the vehicle, deg."""
+    time = np.arange(0.0, run.path.duration, 0.1)
+    tilts = {"roll": run.path.roll(time), "pitch": run.path.pitch(time)}
+    return {name: float(np.degrees(np.abs(tilt)).max()) for name, tilt in tilts.items()}
+
+
+def _described(place: Site) -> dict[str, Any]:
+    """Return the scenario of a site without where its files are."""
+    files = {"track": {"file", "odometer"}}
+    described: dict[str, Any] = place.scenario().model_dump(mode="json", exclude=files if place.folder else None)
+    return described
+
+
 def _horizontal_max(recording: Recording, label: str) -> float:
     assert recording.reference is not None
     return float(np.max(compare_to_reference(batch.run(recording, label), recording.reference).horizontal))
@@ -148,7 +165,6 @@ def _settings(configurations: Configurations, experiments: dict[str, Experiment]
         {
             "runs": {name: len(labels) for name, labels in configurations.items()},
             "runs of the car and the experiments": {name: len(labels) for name, labels in FEW.items()},
-            "scenarios": {vehicle.name: vehicle.base.model_dump(mode="json") for vehicle in (ROBOT, CAR)},
             "rolling": {**asdict(RollingOptions()), "standstill": False},
             "experiments": {name: experiment.source for name, experiment in experiments.items()},
             "experiment_seeds": {name: experiment.seeds for name, experiment in experiments.items()},

@@ -27,6 +27,7 @@ from polyins.simulation.wheel_scenario import Slip
 
 Array = NDArray[np.float64]
 World = Literal["plane", "turning", "slip", "level"]
+"""as in the scenario; on the Earth, which turns; with slip; without slopes"""
 
 CONSTANT = ROBOT.base.errors
 DRIFTING = Errors(turn_on_share=1.0 - (25.0 / 200.0) ** 2)
@@ -45,7 +46,7 @@ FIELD_SEEDS = 3
 
 @dataclass(frozen=True)
 class Experiment:
-    """A run that differs from Table III's chips, constant errors, a known installation, on the plane."""
+    """A run that differs from Table III's chips, constant errors, a known installation, on a plane Earth."""
 
     source: str
     """what differs, and where its size is from"""

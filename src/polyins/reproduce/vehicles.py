@@ -1,4 +1,4 @@
-"""The robot and the car of paper B's lab on their real tracks: four chips in each wheel, four on the body, no GNSS."""
+"""The robot and the car of paper B's lab: four chips in each wheel, four on the body, no GNSS."""
 
 from __future__ import annotations
 

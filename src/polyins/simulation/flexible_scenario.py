@@ -183,6 +183,12 @@ class Road(Section):
             raise blame("wavelengths_m", f"are {list(self.wavelengths_m)}; expected the shortest, then the longest")
         return self
 
+    @model_validator(mode="after")
+    def _has_books_to_shuffle(self) -> Self:
+        if self.books_shuffled and not self.books:
+            raise blame("books_shuffled", "is true without books; expected some")
+        return self
+
     def suspension(self) -> Suspension:
         """Return the robot's body on its wheels."""
         rates = 2.0 * np.pi * np.array([self.heave_hz, self.pitch_hz, self.roll_hz])
@@ -207,8 +213,8 @@ class Road(Section):
 
     def _shuffled(self, rng: np.random.Generator) -> tuple[Book, ...]:
         """Return the books, each at the place of another one and under the wheels of a third one."""
-        count = len(self.books)
-        laid = zip(self.books, rng.permutation(count), rng.permutation(count), strict=True)
+        count, drawing = len(self.books), rng.spawn(1)[0]  # the ground stays as it is
+        laid = zip(self.books, drawing.permutation(count), drawing.permutation(count), strict=True)
         return tuple(
             book.model_copy(update={"at_m": self.books[place].at_m, "under": self.books[side].under})
             for book, place, side in laid

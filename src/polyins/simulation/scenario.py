@@ -112,7 +112,7 @@ class Scenario(Section):
     name: str = "simulated drive"
     """of the recording"""
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
-    """another seed gives another drive with other errors"""
+    """another seed gives other errors, and another drive where no track or laps or replay is given"""
     path_seed: Annotated[int, Field(ge=0, strict=True)] | None = None
     """of the drive and the wheels' slip, where they are to stay while seed draws other errors; without it seed"""
     duration_s: Positive = 1000.0
@@ -130,7 +130,7 @@ class Scenario(Section):
     track: Track | None = None
     """a surveyed track instead of a drive"""
     laps: Laps | None = None
-    """laps of a rectangle instead of a drive; their length is their own"""
+    """laps of a rectangle instead of a drive; they are driven to their end unless duration_s is given"""
     replay: Replay | None = None
     """a surveyed drive, driven again, instead of one of its own; its length and its standing start are its own"""
     shuttle: Shuttle | None = None
@@ -150,7 +150,7 @@ class Scenario(Section):
     filter_noise: Noise | None = None
     """how good the configuration says they are; without it as good as they are"""
     initial_std: InitialStd | None = None
-    """how far off the configuration says they may be at the start; without it as far as noise and errors have it"""
+    """how far off they may be at the start, as `initial_std` of a configuration; the rest is as noise and errors say"""
     errors: Errors = Errors()
     """which errors they have"""
     gnss: Fixes | None = Fixes()
@@ -189,7 +189,7 @@ class Scenario(Section):
     def _mounts_and_ground_fit(self) -> Self:
         ways = [name for name in ("track", "laps", "replay", "shuttle") if getattr(self, name)]
         if len(ways) > 1:
-            raise blame(ways[-1], f"is given with a {ways[0]}; expected one of them")
+            raise blame(ways[-1], f"is given with {ways[0]}; expected one of them")
         if self.replay and self.earth != "turning":
             raise blame("replay", "has latitudes and longitudes; expected earth: turning")
         if self.replay and self.start:
@@ -243,7 +243,9 @@ class Scenario(Section):
                 for index, position in enumerate(self.imus.positions())
             ]
         imus += [imu for wheel in self.wheels for imu in wheel.imus(grade)]
-        std = self.errors.start_std(grade) if self.initial_std is None else initial_std(self.initial_std, grade)
+        std = self.errors.start_std(grade)
+        if self.initial_std:
+            std = initial_std(self.initial_std, std or grade.slow_std())
         imus = [replace(imu, initial_std=std) for imu in imus]
         return Rig(tuple(imus), np.array(self.gnss.antenna_position_m if self.gnss else (0.0, 0.0, 0.0)))
 

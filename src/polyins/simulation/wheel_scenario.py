@@ -14,7 +14,7 @@ from polyins.config.fields import blame
 from polyins.io.columns import column_names, read_columns
 from polyins.rig import DEG, Imu, NoiseGrade, Wheel
 from polyins.simulation import earth
-from polyins.simulation.laps import lap_length, lap_points, lap_speeds
+from polyins.simulation.laps import STARTING, lap_length, lap_points, lap_speeds
 from polyins.simulation.path import Path, World
 from polyins.simulation.rolling import RollingWheel, roll
 from polyins.simulation.slip import slip_periods
@@ -85,13 +85,13 @@ class Terrain(Section):
     """The ground along a way: level unless slopes are asked for."""
 
     slope_deg: Annotated[Number, Field(ge=0.0, le=5.0)] = 0.0
-    """the steepest slope of ground in waves, deg; with wheels it does not twist: it rolls, short waves are flatter"""
+    """of ground in waves along the way, deg; with wheels it is bent until it does not twist, and rolls as well"""
     slope_length_m: Positive = 60.0
     """of a wave of the ground, m"""
 
 
 class Track(Terrain):
-    """A surveyed track and the speeds at which it is travelled; the ground is level unless slopes are asked for."""
+    """A surveyed track and the speeds at which it is travelled."""
 
     file: str
     """a table of points in their order: latitude_deg, longitude_deg, or north_m, east_m"""
@@ -151,6 +151,9 @@ class Laps(Terrain):
     def _can_be_driven(self) -> Self:
         if 2.0 * self.corner_m > min(self.length_m, self.width_m):
             raise blame("corner_m", f"is {self.corner_m:g}; expected at most half of length_m and of width_m")
+        way = self.count * lap_length(self.length_m, self.width_m, self.corner_m)
+        if way < 2.0 * STARTING * self.speed_m_s:
+            raise blame("count", f"is {self.count}; expected laps of at least {2.0 * STARTING:g} s at speed_m_s")
         if self.change_m_s >= self.speed_m_s:
             raise blame("change_m_s", f"is {self.change_m_s:g}; expected less than the {self.speed_m_s:g} of speed_m_s")
         return self
