@@ -18,7 +18,7 @@ from polyins.reproduce.targets import Document
 
 ALONE = ("a4", "b8")
 """Those that measure time: they run when nothing else does."""
-SECONDS = {"a3": (13, 240), "a5": (28, 2500), "a6": (7, 180), "afig3": (9, 120), "array": (10, 240), "b6": (23, 650),
+SECONDS = {"a3": (13, 240), "a5": (28, 2600), "a6": (7, 180), "afig3": (9, 120), "array": (10, 240), "b6": (23, 700),
            "b7": (38, 180), "b8": (5, 40), "flights": (10, 40), "split": (12, 120), "wid": (42, 60)}  # fmt: skip
 """About how long a target takes on one core, quick and in full, for the bar and to begin with the longest."""
 OTHERS_S = 5, 30
