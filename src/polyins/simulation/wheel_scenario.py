@@ -89,6 +89,27 @@ class Terrain(Section):
     slope_length_m: Positive = 60.0
     """of a wave of the ground, m"""
 
+    def over(
+        self,
+        points: tuple[Array, Array],
+        speeds: tuple[Array, Array],
+        static: float,
+        start: ArrayLike,
+        world: World,
+        **shape: float,
+    ) -> Path:
+        """Return the path over this ground, see `track_path`, which `shape` is for: points, m; times, s, and m/s."""
+        return track_path(
+            *points,
+            *speeds,
+            static=static,
+            steepest=self.slope_deg * DEG,
+            wave=self.slope_length_m,
+            start=start,
+            world=world,
+            **shape,
+        )
+
 
 class Track(Terrain):
     """A surveyed track and the speeds at which it is travelled."""
@@ -104,21 +125,9 @@ class Track(Terrain):
 
     def path(self, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path along the track; raises InputError for files that give none."""
-        north, east = self._points()
         _, (time, speed) = read_columns(self.odometer, ("time_s", "speed_m_s"))
-        return track_path(
-            north,
-            east,
-            time,
-            speed,
-            static=static,
-            rest=self.rest_s,
-            smoothing=self.smoothing_m,
-            steepest=self.slope_deg * DEG,
-            wave=self.slope_length_m,
-            start=start,
-            world=world,
-        )
+        shape = {"rest": self.rest_s, "smoothing": self.smoothing_m}
+        return self.over(self._points(), (time, speed), static, start, world, **shape)
 
     def _points(self) -> tuple[Array, Array]:
         """Return the points north and east of the first one, m."""
@@ -151,8 +160,7 @@ class Laps(Terrain):
     def _can_be_driven(self) -> Self:
         if 2.0 * self.corner_m > min(self.length_m, self.width_m):
             raise blame("corner_m", f"is {self.corner_m:g}; expected at most half of length_m and of width_m")
-        way = self.count * lap_length(self.length_m, self.width_m, self.corner_m)
-        if way < 2.0 * STARTING * self.speed_m_s:
+        if self._length < 2.0 * STARTING * self.speed_m_s:
             raise blame("count", f"is {self.count}; expected laps of at least {2.0 * STARTING:g} s at speed_m_s")
         if self.change_m_s >= self.speed_m_s:
             raise blame("change_m_s", f"is {self.change_m_s:g}; expected less than the {self.speed_m_s:g} of speed_m_s")
@@ -160,17 +168,9 @@ class Laps(Terrain):
 
     def path(self, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path around; it begins and ends at rest."""
-        north, east = lap_points(self.length_m, self.width_m, self.corner_m, self.count)
-        way = lap_length(self.length_m, self.width_m, self.corner_m) * self.count
-        time, speed = lap_speeds(way, self.speed_m_s, self.change_m_s)
-        return track_path(
-            north,
-            east,
-            time,
-            speed,
-            static=static,
-            steepest=self.slope_deg * DEG,
-            wave=self.slope_length_m,
-            start=start,
-            world=world,
-        )
+        points = lap_points(self.length_m, self.width_m, self.corner_m, self.count)
+        return self.over(points, lap_speeds(self._length, self.speed_m_s, self.change_m_s), static, start, world)
+
+    @property
+    def _length(self) -> float:
+        return self.count * lap_length(self.length_m, self.width_m, self.corner_m)
