@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from polyins.recording import Recording
+from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Fixes, Scenario
 from polyins.simulation.wheel_scenario import WheelModule
@@ -35,7 +36,7 @@ def drive(chips: int = 1, gnss: bool = False, errors: Errors = PERFECT, seed: in
         duration_s=120.0,
         static_s=10.0,
         earth="plane",
-        top_speed_m_s=4.0,
+        drive=Drive(top_speed_m_s=4.0),
         imus=Board(count=1, position_m=(0.3, 0.1, -0.4)),
         wheels=wheel_modules,
         errors=errors,

@@ -116,6 +116,13 @@ def test_simulate_writes_a_recording_that_runs(tmp_path: Path) -> None:
     assert (tmp_path / "polyins-out/solution.parquet").is_file()
 
 
+def test_simulate_says_what_is_doubtful(tmp_path: Path) -> None:
+    (tmp_path / "scenario.yaml").write_text("duration_s: 30\nstatic_s: 10\nimus: {count: 1}\n")
+    made = polyins("simulate", "scenario.yaml", folder=tmp_path)
+    assert made.returncode == 0
+    assert "warning: outages: the drive is too short for one" in made.stderr
+
+
 def test_info_init_and_convert(config: Path, tmp_path: Path) -> None:
     imu = config.parent / "imu1.parquet"
     facts = json.loads(polyins("info", imu, "--json").stdout)

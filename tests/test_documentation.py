@@ -38,7 +38,7 @@ from polyins.config import columns
 from polyins.io.yaml_document import read_yaml
 from polyins.recording import GnssStream, ImuStream, Reference
 from polyins.simulation import error_scenario, flexible_scenario, scenario
-from polyins.simulation.replay_scenario import Replay
+from polyins.simulation.drive_scenario import Drive, Replay
 from polyins.simulation.wheel_scenario import Laps, Slip, Track, WheelModule
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -130,7 +130,7 @@ def write_robot(folder: Path) -> None:
         duration_s=200,
         static_s=20,
         rate_hz=100,
-        top_speed_m_s=1.8,
+        drive=Drive(top_speed_m_s=1.8),
         imus=scenario.Board(count=1, position_m=(0.1, 0.0, -0.15)),
         wheels=wheels,
         outages=(),
@@ -453,6 +453,7 @@ SCENARIO: dict[str, type[BaseModel]] = {
     "wheels[].slip": Slip,
     "track": Track,
     "laps": Laps,
+    "drive": Drive,
     "replay": Replay,
 }
 KINDS = (

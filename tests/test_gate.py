@@ -11,17 +11,11 @@ from numpy.typing import NDArray
 from polyins import batch
 from polyins.geodesy import metres_per_unit
 from polyins.recording import Recording
-from polyins.reproduce.array import GNSS
-from polyins.simulation.scenario import Board, Errors, Scenario, simulate
+from polyins.reproduce.array import SCENARIOS
+from polyins.simulation.scenario import Board, simulate
 from polyins.solution import Innovations
 
-CHIPS = Scenario(
-    duration_s=400.0,
-    rate_hz=100.0,
-    imus=Board(count=4),
-    gnss=GNSS,
-    errors=Errors(misalignment_deg=0.2, turn_on_share=0.5),
-)
+CHIPS = SCENARIOS["chips"].model_copy(update={"duration_s": 400.0, "rate_hz": 100.0, "imus": Board(count=4)})
 """Outages of 30 s every 90 s; one fix per second."""
 
 

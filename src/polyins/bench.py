@@ -114,6 +114,7 @@ def array(count: int, seconds: float = SECONDS) -> Recording:
 
 def vehicle(seconds: float = SECONDS) -> Recording:
     """Return a simulated recording of a robot: an IMU in each of two wheels and one on the body, no GNSS."""
+    from polyins.simulation.drive_scenario import Drive
     from polyins.simulation.scenario import Board, Scenario, simulate
     from polyins.simulation.wheel_scenario import WheelModule
 
@@ -122,7 +123,8 @@ def vehicle(seconds: float = SECONDS) -> Recording:
         WheelModule(name=name, position_m=(0.0, right, 0.0), radius_m=0.1, chips=1)
         for name, right in (("left", -half), ("right", half))
     )
-    return simulate(Scenario(duration_s=seconds, imus=Board(count=1), wheels=wheels, gnss=None, top_speed_m_s=2.0))
+    slow = Drive(top_speed_m_s=2.0)
+    return simulate(Scenario(duration_s=seconds, imus=Board(count=1), wheels=wheels, gnss=None, drive=slow))
 
 
 def _processor() -> str:

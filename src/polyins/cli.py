@@ -325,7 +325,10 @@ def simulate(scenario: Path, out: Path, seed: int | None) -> None:
     from polyins.simulation.scenario import simulate as drive
 
     with progress("simulating"):
-        config = files.write(drive(scenario, seed=seed), out)
+        recording = drive(scenario, seed=seed)
+        config = files.write(recording, out)
+    for warning in recording.warnings:
+        say(f"warning: {warning}")
     say(f"configuration: {config}")
 
 

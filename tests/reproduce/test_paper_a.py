@@ -9,8 +9,9 @@ from polyins import bench
 from polyins.recording import ImuStream
 from polyins.reproduce import a3, a4, afig3, chips, rigid_array, split
 from polyins.reproduce.progress import Steps
+from polyins.reproduce.scenario_files import read
 from polyins.simulation.imu_errors import Imperfections, corrupt, draw_errors
-from polyins.simulation.run import record
+from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Scenario
 
 
@@ -29,10 +30,14 @@ def small(monkeypatch: pytest.MonkeyPatch) -> Scenario:
 
 
 def test_the_scenario_has_the_real_outages() -> None:
-    outages = rigid_array.base_scenario(quick=False).outage_intervals()
+    scenario = read(Scenario, "a3")
+    outages = scenario.outage_intervals()
+    assert scenario.replay is not None
+    first = scenario.replay.from_s
+    assert first is not None
     assert len(outages) == 29
-    assert outages[0][0] + rigid_array.FIRST == 271130.0
-    assert outages[-1] == (271130.0 + 90.0 * 28 - rigid_array.FIRST, 271160.0 + 90.0 * 28 - rigid_array.FIRST)
+    assert outages[0][0] + first == 271130.0
+    assert outages[-1] == (271130.0 + 90.0 * 28 - first, 271160.0 + 90.0 * 28 - first)
 
 
 def test_a_calibration_takes_off_what_the_simulation_put_on() -> None:
@@ -90,9 +95,7 @@ def test_a3_without_the_data_set_says_so(small: Scenario, monkeypatch: pytest.Mo
     assert ours["largest_difference_of_methods"] < 0.05
     assert (tmp_path / "a3-sources.html").stat().st_size > 10_000
     assert rigid_array.figures(
-        rigid_array.recording_of(
-            a3.with_chips(rigid_array.drive(small), small.errors, rigid_array.group_chips(1, 4)), seed=1
-        ),
+        rigid_array.recording_of(a3.with_chips(true_run(small), small.errors, rigid_array.group_chips(1, 4)), seed=1),
         a3.METHODS,
     ) == {key: value for key, value in ours["uncompensated"]["group1"].items() if key != "ratio"}
 
@@ -106,7 +109,7 @@ def test_exact_sensors_and_exact_fixes_leave_no_error(data_folder: Path, small: 
     assert small.gnss is not None
     fine, nothing_slow = (1e-4, 1e-4, 1e-4), (0.0, 0.0, 0.0)
     exact = small.gnss.model_copy(update={"position_std_m": fine, "slow_std_m": nothing_slow, "stated_std_m": fine})
-    run = rigid_array.drive(small.model_copy(update={"errors": nothing, "gnss": exact, "rate_hz": rate_hz}))
+    run = true_run(small.model_copy(update={"errors": nothing, "gnss": exact, "rate_hz": rate_hz}))
     assert rigid_array.maxima(record(run, seed=0).recording, "single").max() < 0.1
 
 

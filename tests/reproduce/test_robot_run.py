@@ -16,6 +16,7 @@ from polyins.reproduce import b6, b7, robot_experiments
 from polyins.reproduce.robot import CONFIGURATIONS, FEW, Score, as_in_the_paper, at_the_reference, by_seed, score, table
 from polyins.reproduce.sites import site
 from polyins.reproduce.vehicles import ROBOT
+from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario
 
@@ -29,7 +30,7 @@ def short():
     scenario = Scenario(
         duration_s=60.0,
         static_s=10.0,
-        top_speed_m_s=1.9,
+        drive=Drive(top_speed_m_s=1.9),
         imus=Board(count=4, pitch_m=0.0, position_m=robot.imus.position_m),
         wheels=robot.wheels,
         noise=robot.noise,
@@ -166,7 +167,7 @@ def test_a_wheel_does_not_know_the_slope_and_the_body_does(monkeypatch):
     monkeypatch.setattr(b6, "ONE_SAMPLE_S", b6.WINDOW)
     scenario = site(ROBOT, quick=False).scenario()
     way = "track" if scenario.track else "laps"
-    halved = getattr(scenario, way).model_copy(update={"slope_deg": 0.5 * ROBOT.base.laps.slope_deg})
+    halved = getattr(scenario, way).model_copy(update={"slope_deg": 0.5 * ROBOT.laps.slope_deg})
     hilly, flatter = (true_run(each) for each in (scenario, scenario.model_copy(update={way: halved})))
     (wheels,), (body,) = (b6.error_free_run(hilly, labels).values() for labels in (b6.WHEELS, b6.WITH_BODY))
     assert body < 0.005

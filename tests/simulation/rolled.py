@@ -6,7 +6,7 @@ import numpy as np
 
 from polyins.simulation import earth
 from polyins.simulation.ground import without_twist
-from polyins.simulation.path import START, drive
+from polyins.simulation.path import START, Driving, drive
 from polyins.simulation.plane import Plane
 from polyins.simulation.rolling import roll
 
@@ -19,7 +19,8 @@ WORLDS = {"earth": earth, "plane": Plane()}
 @cache
 def drawn(world, duration=120.0, top_speed=1.9):
     start = START if world == "earth" else (0.0, 0.0, 0.0)
-    twisting = drive(duration, static=10.0, seed=2, start=start, top_speed=top_speed, world=WORLDS[world])
+    driving = Driving(top_speed=top_speed)
+    twisting = drive(duration, static=10.0, seed=2, start=start, driving=driving, world=WORLDS[world])
     return without_twist(twisting)
 
 

@@ -122,6 +122,11 @@ def test_the_reference_shakes_with_the_body():
             "road.books: lie on the straights of a shuttle",
         ),
         (
+            "shuttle: {straight_m: 10}\nrulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\n"
+            "road: {books: [{at_m: 9.9, height_m: 0.01}]}",
+            "road.books: one at 9.9 m ends beyond the straight; expected all within the 10 m",
+        ),
+        (
             "rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\nroad: {wavelengths_m: [3, 1]}",
             "wavelengths_m: are .3.0, 1.0.; expected the shortest",
         ),

@@ -66,7 +66,7 @@ def test_vehicles_go_up_and_down_and_lean_as_the_ground_does(vehicle):
         # the ground does not twist: it is bent, so slopes are not those of the file, but of their size
         assert np.degrees(tilt).min() < -0.2
         assert np.degrees(tilt).max() > 0.2
-        assert np.abs(np.degrees(tilt)).max() < 1.5 * vehicle.base.laps.slope_deg
+        assert np.abs(np.degrees(tilt)).max() < 1.5 * vehicle.laps.slope_deg
     assert not level.roll(time).any()
     assert not level.pitch(time).any()
     np.testing.assert_array_equal(hilly.heading(time), level.heading(time))

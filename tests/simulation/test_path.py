@@ -7,7 +7,7 @@ from pymap3d import ecef2ned, geodetic2ecef
 
 from polyins.attitude import rotation_matrices
 from polyins.simulation import earth
-from polyins.simulation.path import LATERAL_LIMIT, SLOPE_LIMIT, TURN_RADIUS, drive, path, smooth_steps
+from polyins.simulation.path import Driving, drive, path, smooth_steps
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -15,15 +15,16 @@ SEEDS = st.integers(0, 2**32 - 1)
 @settings(max_examples=8, deadline=None)
 @given(SEEDS)
 def test_any_seed_gives_a_drivable_path(seed):
-    drawn = drive(400.0, static=30.0, seed=seed)
+    driving = Driving()
+    drawn = drive(400.0, static=30.0, seed=seed, driving=driving)
     time = np.arange(0.0, 400.0, 0.1)
     speed, yaw_rate = drawn.speed(time), drawn.heading(time, 1)
     assert speed.min() >= -1e-12
     assert 8.0 < speed.max() <= 16.0 + 1e-9
     assert np.abs(drawn.speed(time, 1)).max() <= 2.5
-    assert np.all(np.abs(yaw_rate) * TURN_RADIUS <= speed + 1e-9)
-    assert np.abs(speed * yaw_rate).max() <= 1.6 * LATERAL_LIMIT
-    assert np.abs(drawn.pitch(time)).max() <= SLOPE_LIMIT + 1e-12
+    assert np.all(np.abs(yaw_rate) * driving.turn_radius <= speed + 1e-9)
+    assert np.abs(speed * yaw_rate).max() <= 1.6 * driving.lateral_acceleration
+    assert np.abs(drawn.pitch(time)).max() <= driving.steepest + 1e-12
     assert np.abs(drawn.roll(time)).max() < np.radians(6.0)
     assert np.ptp(drawn.heading(time)) > np.radians(90.0)
 

@@ -1,5 +1,6 @@
 """A replayed drive goes where the positions were, at their speed, pointing along its course."""
 
+from dataclasses import asdict
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -8,10 +9,11 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.geodesy import displacement
-from polyins.reproduce.rigid_array import FIRST, LAST
+from polyins.reproduce.rigid_array import base_scenario
 from polyins.rig import DEG
-from polyins.simulation.path import Path, drive
-from polyins.simulation.replay import HELD_BELOW, replay
+from polyins.simulation.drive_scenario import Drive, Replay
+from polyins.simulation.path import Driving, Path, drive
+from polyins.simulation.replay import HELD_BELOW, Ride, replay
 from polyins.simulation.run import true_run
 from polyins.simulation.scenario import read_scenario, simulate
 
@@ -119,8 +121,8 @@ def test_positions_that_make_no_path(fixes: tuple[Array, Array, Array], rows: in
 
 def test_the_real_track(data_folder: FilePath) -> None:
     rows = np.loadtxt(data_folder / "whu-array" / "gnss_group1.txt")[:900]
-    path, apart = replayed(rows)
-    assert np.abs(apart[:, :2]).max() < 0.8
+    path = replay(rows[:, 0], np.column_stack([rows[:, 1:3] * DEG, rows[:, 3]]), rows[:, 4:7])
+    assert np.abs(off(path, rows)[:, :2]).max() < 0.8
     assert path.static == pytest.approx(358.0, abs=4.0)
     time = np.arange(0.0, path.duration, 0.1)
     assert np.abs(path.speed(time, 1)).max() < 4.0
@@ -128,19 +130,22 @@ def test_the_real_track(data_folder: FilePath) -> None:
 
 
 def test_all_that_is_used_of_the_real_track(data_folder: FilePath) -> None:
+    scenario = base_scenario(quick=False)
+    assert scenario.replay is not None
+    path = scenario.replay.path(0)
     rows = np.loadtxt(data_folder / "whu-array" / "gnss_group1.txt")
-    path, apart = replayed(rows[(rows[:, 0] >= FIRST) & (rows[:, 0] <= LAST)])
+    used = (rows[:, 0] >= scenario.replay.from_s) & (rows[:, 0] <= scenario.replay.to_s)
+    apart = off(path, rows[used])
     assert np.hypot(*apart[:, :2].T).max() < 1.1
     assert np.sqrt(np.mean(apart**2)) < 0.3
-    assert path.static == pytest.approx(60.0, abs=4.0)
+    assert path.static == scenario.static_s
 
 
-def replayed(rows: Array) -> tuple[Path, Array]:
-    """Return the path along positions, and how far it is from them, m."""
+def off(path: Path, rows: Array) -> Array:
+    """Return how far a path is from the positions of a file, m."""
     points = np.column_stack([rows[:, 1:3] * DEG, rows[:, 3]])
-    path = replay(rows[:, 0], points, rows[:, 4:7])
     driven = path.position(rows[:, 0] - rows[0, 0])
-    return path, displacement(driven, points[0], True) - displacement(points, points[0], True)
+    return displacement(driven, points[0], True) - displacement(points, points[0], True)
 
 
 def replay_file(folder: FilePath, fixes: tuple[Array, Array, Array], text: str = "") -> FilePath:
@@ -185,18 +190,25 @@ def test_a_scenario_refuses_what_cannot_be_driven_again(tmp_path: FilePath, fixe
     }.items():
         with pytest.raises(InputError, match=message):
             read_scenario(replay_file(tmp_path, fixes, text))
+    part = read_scenario(replay_file(tmp_path, fixes)).replay
+    assert part is not None
+    with pytest.raises(InputError, match=r"no positions from 10 to 20 s; .*rtk\.csv covers 1000 to 1240 s"):
+        part.model_copy(update={"from_s": 10.0, "to_s": 20.0}).path(0)
     scenario = replay_file(tmp_path, fixes)
     lines = (tmp_path / "rtk.csv").read_text().splitlines()
     (tmp_path / "rtk.csv").write_text("\n".join([*lines[:5], "1004,,114.0,35.0", *lines[6:]]))
-    with pytest.raises(InputError, match="none of them missing"):
+    with pytest.raises(InputError, match=r"rtk\.csv, line 6: position is missing"):
         simulate(scenario)
-    (tmp_path / "rtk.csv").write_text("time_s,lat\n0,1\n")
-    with pytest.raises(InputError, match=r"rtk\.csv: .*latitude_deg"):
+    (tmp_path / "rtk.csv").write_text("time_s,north_m,east_m,down_m\n0,1,1,0\n1,2,1,0\n")
+    with pytest.raises(InputError, match=r"rtk\.csv: holds no latitudes"):
+        simulate(scenario)
+    (tmp_path / "rtk.csv").write_text("time_s,a,b,c\n0,1,2,3\n")
+    with pytest.raises(InputError, match=r"rtk\.csv: .*latitude, longitude, height"):
         simulate(scenario)
 
 
 def test_a_nose_points_into_the_turn_where_slip_is_asked_for(fixes: tuple[Array, Array, Array], again: Path) -> None:
-    slipping = replay(*fixes, side_slip=0.5 * DEG)
+    slipping = replay(*fixes, ride=Ride(side_slip=0.5 * DEG))
     time = np.arange(35.0, 239.0, 0.1)
     origin = fixes[1][0]
     apart = displacement(slipping.position(time), origin, True) - displacement(again.position(time), origin, True)
@@ -228,3 +240,64 @@ def test_a_survey_is_driven_to_its_end_unless_it_is_cut(tmp_path: FilePath, fixe
     }.items():
         with pytest.raises(InputError, match=message):
             simulate(replay_file(tmp_path, fixes, text))
+
+
+def test_the_file_of_a_receiver_is_driven_again_as_sure_as_it_says(
+    tmp_path: FilePath, fixes: tuple[Array, Array, Array]
+) -> None:
+    time, position, std = fixes
+    np.savetxt(tmp_path / "rtk.txt", np.column_stack([time, position[:, :2] / DEG, position[:, 2], std]), fmt="%.12f")
+    seconds = np.linspace(0.0, 200.0, 50)
+    path = Replay(file=str(tmp_path / "rtk.txt")).path(3)
+    np.testing.assert_allclose(path.roll(seconds), replay(*fixes, seed=3).roll(seconds), atol=1e-6)
+    # told that they are worse it follows them less
+    loose = Replay(file=str(tmp_path / "rtk.txt"), position_std_m=(2.0, 2.0, 2.0)).path(3)
+    assert np.abs(path.speed(seconds) - loose.speed(seconds)).max() > 0.1
+    # a part of it begins where the survey is then
+    later = Replay(file=str(tmp_path / "rtk.txt"), from_s=1060.0, to_s=1230.0).path(3)
+    assert later.duration == pytest.approx(170.0)
+    np.testing.assert_allclose(later.position(np.zeros(1))[0], position[60], atol=1e-9)
+    np.testing.assert_allclose(later.speed(seconds[:40]), path.speed(seconds[:40] + 60.0), atol=0.3)
+
+
+def test_the_road_and_the_springs_are_as_the_scenario_says(
+    tmp_path: FilePath, fixes: tuple[Array, Array, Array]
+) -> None:
+    file = str(replay_file(tmp_path, fixes).with_name("rtk.csv"))
+    stiff = Replay(file=file, camber_deg=0.0, roll_deg_per_m_s2=0.0, pitch_deg_per_m_s2=0.0).path(0)
+    time = np.arange(35.0, 239.0, 0.1)
+    assert not stiff.roll(time).any()
+    across = stiff.speed(time) * stiff.heading(time, 1)
+    leaning = Replay(file=file, camber_deg=0.0, roll_deg_per_m_s2=1.0, pitch_deg_per_m_s2=0.0).path(0)
+    assert np.polyfit(across, leaning.roll(time), 1)[0] == pytest.approx(-1.0 * DEG, rel=0.1)
+    diving = Replay(file=file, camber_deg=0.0, roll_deg_per_m_s2=0.0, pitch_deg_per_m_s2=1.0).path(0)
+    along = stiff.speed(time, 1)
+    assert np.polyfit(along, diving.pitch(time) - stiff.pitch(time), 1)[0] == pytest.approx(1.0 * DEG, rel=0.1)
+    cambered = Replay(file=file, camber_deg=2.0, camber_length_m=20.0, roll_deg_per_m_s2=0.0).path(0)
+    assert np.std(cambered.roll(time)) == pytest.approx(2.0 * DEG * np.sqrt(2.0 / 3.0), rel=0.35)
+
+
+def test_what_a_scenario_does_not_say_of_a_road_is_as_elsewhere() -> None:
+    def of(parameters: object) -> list[float]:
+        return [
+            value / DEG if "std" in key or "per_" in key or key == "steepest" or "slip" in key else value
+            for key, value in asdict(parameters).items()
+        ]  # type: ignore[call-overload]
+
+    assert of(Driving()) == pytest.approx(list(Drive().model_dump().values()))
+    said = Replay(file="").model_dump(exclude={"file", "from_s", "to_s", "position_std_m"})
+    assert of(Ride()) == pytest.approx(list(said.values()))
+
+
+def test_doubts_about_a_survey_reach_the_recording(tmp_path: FilePath, fixes: tuple[Array, Array, Array]) -> None:
+    time, position, std = fixes
+    head = "%  GPST  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)"
+    rows = [
+        f"2300 {t:.3f} {p[0] / DEG:.10f} {p[1] / DEG:.10f} {p[2]:.4f} {2 if t == 1100.0 else 1} 9 {s[0]} {s[1]} {s[2]}"
+        for t, p, s in zip(time, position, std, strict=True)
+    ]
+    (tmp_path / "rtk.pos").write_text("\n".join([head, *rows, ""]))
+    (tmp_path / "scenario.yaml").write_text("rate_hz: 20\nimus: {count: 1}\nreplay: {file: rtk.pos}\n")
+    (warning,) = simulate(tmp_path / "scenario.yaml").warnings
+    assert "rtk.pos" in warning
+    assert "float" in warning

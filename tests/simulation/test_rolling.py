@@ -5,7 +5,7 @@ from rolled import CENTRE, LEVER_ARM, RADIUS, WORLDS, drawn, in_body, wheel
 
 from polyins.geodesy import metres_per_unit
 from polyins.simulation.ground import without_twist
-from polyins.simulation.path import drive, path
+from polyins.simulation.path import Driving, drive, path
 from polyins.simulation.plane import Plane
 from polyins.simulation.rolling import roll
 from polyins.simulation.slip import slip_periods
@@ -36,7 +36,7 @@ def test_a_wheel_on_ground_without_twist_moves_neither_sideways_nor_up(world):
 
 
 def test_on_a_twisting_road_the_wheel_goes_up_by_the_roll_rate():
-    road = drive(120.0, static=10.0, seed=2, start=(0.0, 0.0, 0.0), top_speed=1.9, world=Plane())
+    road = drive(120.0, static=10.0, seed=2, start=(0.0, 0.0, 0.0), driving=Driving(top_speed=1.9), world=Plane())
     vehicle, centre = road.motion(TIME), roll(road, CENTRE, RADIUS).motion(TIME)
     across = in_body(vehicle, centre.velocity)[:, 1:]
     np.testing.assert_allclose(across[:, 1], vehicle.angular_rate[:, 0] * CENTRE[1], atol=1e-14)

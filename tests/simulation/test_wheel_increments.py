@@ -7,7 +7,7 @@ from rolled import CENTRE, LEVER_ARM, RADIUS, WORLDS, drawn, in_body, wheel
 from scipy.spatial.transform import Rotation
 
 from polyins.simulation.ground import without_twist
-from polyins.simulation.path import drive, path
+from polyins.simulation.path import Driving, drive, path
 from polyins.simulation.plane import Plane
 from polyins.simulation.rolling import roll
 from polyins.simulation.wheels import wheel_increments
@@ -77,7 +77,7 @@ def test_a_wheel_at_constant_speed_shows_centripetal_force_and_turning_gravity()
 
 
 def test_mechanized_increments_return_to_the_path_as_fast_as_the_mechanization_allows():
-    rolled = roll(without_twist(drive(DURATION, static=5.0, seed=1, top_speed=1.9)), CENTRE, RADIUS)
+    rolled = roll(without_twist(drive(DURATION, static=5.0, seed=1, driving=Driving(top_speed=1.9))), CENTRE, RADIUS)
     misses = [mechanized(rolled, rate_hz) for rate_hz in (200.0, 400.0, 800.0)]
     # two-sample coning and sculling terms: the error falls with the third power of the interval, not to a floor
     for what in range(3):

@@ -6,6 +6,7 @@ import pytest
 from polyins.errors import InputError
 from polyins.loading import load
 from polyins.reproduce.vehicles import ROBOT
+from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.files import write
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario, read_scenario, simulate, simulate_with_truth
@@ -22,7 +23,7 @@ SHORT = Scenario(
     static_s=10.0,
     rate_hz=100.0,
     earth="plane",
-    top_speed_m_s=1.9,
+    drive=Drive(top_speed_m_s=1.9),
     gnss=None,
     imus=Board(count=2, pitch_m=0.0, position_m=(0.1, 0.0, -0.2)),
     wheels=WHEELS,

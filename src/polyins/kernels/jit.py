@@ -22,11 +22,11 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 PACKAGE = Path(__file__).parents[1]
-COMPILED = ("kernels/*.py", "aiding/*.py", "engine.py")
+COMPILED = ("kernels/*.py", "aiding/*.py", "engine.py", "simulation/flexible.py")
 
 
 def _cache_folder() -> Path:
-    # Numba's cache does not notice an edit in a callee of another file: a folder per state of the sources does.
+    # Numba's cache does not notice an edit in a callee of another file: a folder per state of such files does.
     digest = hashlib.sha256()
     for pattern in COMPILED:
         for source in sorted(PACKAGE.glob(pattern)):

@@ -19,8 +19,9 @@ from polyins.reproduce import rigid_array
 from polyins.reproduce.chips import Chips, parts_of
 from polyins.reproduce.pictures import bars, write_figure
 from polyins.reproduce.progress import Steps
+from polyins.reproduce.scenario_files import read
 from polyins.simulation.error_scenario import Errors
-from polyins.simulation.run import TrueRun
+from polyins.simulation.run import TrueRun, true_run
 
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
 GROUPS = (1, 2, 3, 4)
@@ -54,13 +55,8 @@ SOURCES: Mapping[str, Sequence[str]] = {
 }
 """What is added to white noise, drift, errors of the fixes and the chips' calibrations."""
 
-CANDIDATES: Mapping[str, Mapping[str, float]] = {
-    "rate random walk": {"gyro_random_walk_deg_h_sqrt_h": 50.0, "accel_random_walk_mgal_sqrt_h": 300.0},
-    "g-sensitivity": {"g_sensitivity_deg_s_g": 0.1},
-    "vibration rectification": {"vibration_m_s2": 1.0, "rectification_mg_g2": 3.0, "rectification_spread_mg_g2": 1.0},
-    "common noise and drift": {"common_noise_share": 0.1, "common_drift_share": 0.1},
-}
-"""One source after the other at the upper end of what is plausible."""
+CANDIDATES = tuple(SOURCES)[:4]
+"""Those whose size is an estimate: each in turn at the upper end of what is plausible, `upper.yaml`."""
 UNAWARE = "filter told 250 mGal of offset"
 STATED = "fixes as noisy as they state"
 LATE_S = 4.0
@@ -80,7 +76,7 @@ def reproduce(
     scenario = rigid_array.base_scenario(quick)
     groups = QUICK_GROUPS if quick else GROUPS
     steps = Steps(progress, 2 * len(groups) + 5 + len(SOURCES) + (0 if quick else len(CANDIDATES) + 4))
-    run = rigid_array.drive(scenario)
+    run = true_run(scenario)
     errors = scenario.errors
     tables: dict[str, dict[str, dict[str, float]]] = {"uncompensated": {}, "compensated": {}}
     for number in groups:
@@ -113,7 +109,7 @@ def reproduce(
         "settings": {
             "track": rigid_array.provenance(),
             "outages": len(run.scenario.outage_intervals()),
-            "scenario": scenario.model_dump(mode="json", exclude={"track", "wheels"}),
+            "scenario": scenario.model_dump(mode="json", exclude=rigid_array.ELSEWHERE),
             "sources": "added one after the other, each with all before it; Group 1's chips",
             "seeds": seeds,
         },
@@ -179,9 +175,10 @@ def try_candidates(
     run: TrueRun, errors: Errors, chips: Chips, seeds: Sequence[int], steps: Steps
 ) -> dict[str, dict[str, float]]:
     """Return the same with one source larger, with a filter told too little, and with a start a little wrong."""
-    own = with_chips(run, errors, chips)
+    own, upper = with_chips(run, errors, chips), read(Errors, "upper").model_dump()
     makers: dict[str, Callable[[int], Recording]] = {
-        name: partial(rigid_array.recording_of, _changed(own, sizes)) for name, sizes in CANDIDATES.items()
+        name: partial(rigid_array.recording_of, _changed(own, {key: upper[key] for key in SOURCES[name]}))
+        for name in CANDIDATES
     }
     plain, sensitive = partial(rigid_array.recording_of, own), makers["g-sensitivity"]
     makers[UNAWARE] = lambda seed: rigid_array.unaware(plain(seed))
@@ -254,11 +251,11 @@ def statement(sources: Mapping[str, Mapping[str, float]], candidates: Mapping[st
 def size_for(figure: float, sources: Mapping[str, Mapping[str, float]], at_most: float) -> float:
     """Return the g-sensitivity, deg/s/g, that makes a single IMU's figure, m, whose square is linear in its square.
 
-    `at_most` is the figure at the size of `CANDIDATES`; the other point is that of no g-sensitivity.
+    `at_most` is the figure at the size of `upper.yaml`; the other point is that of no g-sensitivity.
     """
     names = list(sources)
     without = sources[names[names.index("g-sensitivity") - 1]]["single"] ** 2
-    largest = CANDIDATES["g-sensitivity"]["g_sensitivity_deg_s_g"]
+    largest = read(Errors, "upper").g_sensitivity_deg_s_g
     return float(largest * np.sqrt(max(figure**2 - without, 0.0) / (at_most**2 - without)))
 
 

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins import batch
-from polyins.config import OutageSchedule
 from polyins.recording import StartOptions
 from polyins.reproduce import nonrigid
-from polyins.reproduce.array import EXACT_GNSS, MODELLED
 from polyins.reproduce.pictures import lines, write_figure
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.rigid_array import maxima, rms
+from polyins.reproduce.scenario_files import scenarios
 from polyins.rig import DEG
 from polyins.simulation.path import Path
 from polyins.simulation.run import TrueRun, record, true_run
@@ -30,13 +29,11 @@ Array = NDArray[np.float64]
 
 ARRAYS = {"rigid": "rigid", "on rulers": "test A"}
 """the six IMUs of Table V's test A on the lawn, on rulers that do not bend and on those that do"""
-DRIVE_S = 75.0
-FIX_PHASE_S = 0.9988
-"""so that a fix comes a second after the filters begin, as in the paper's figure"""
 SHOWN = (51.0, 53.0)
 """s after the standing start: the paper's figure; its filters seem to begin there, for all have the same first value"""
-START_STD = 0.02, 0.15, (1.0, 1.0, 3.0)
-"""m, m/s, deg (roll, pitch, heading): not in the paper; 0.15 m/s alone would make its 0.155 m after 1 s"""
+
+SCENARIOS = scenarios("afig3")
+ARRAY = SCENARIOS["curves"]
 
 COUNTS = (1, 2, 4, 8, 16, 32, 64)
 QUICK_COUNTS = (1, 2, 4, 8, 16)
@@ -46,14 +43,6 @@ COMMON = 0.05
 """share of the second curve against the number of IMUs"""
 SEEDS = 4
 IMUS = 16
-ARRAY = Scenario(
-    duration_s=900.0,
-    rate_hz=50.0,
-    gnss=EXACT_GNSS,
-    errors=MODELLED,
-    outages=OutageSchedule(length_s=30.0, every_s=90.0, first_after_s=210.0),
-)
-"""Exact fixes, so that the IMUs have nothing in common but what they are given."""
 
 PAPER_FIG3 = {"before_fix_m": [0.155, 0.193], "after_fix_m": [0.018, 0.021]}
 """least and largest east std of six IMUs after one second and after the fix, as the text gives them"""
@@ -88,7 +77,6 @@ def reproduce(
         },
         "settings": {
             "fig3": "least and largest east std of six separate filters, before and after the first fix",
-            "start_std": START_STD,
             "seeds": seeds,
             "sqrt_n": {str(n): float(np.sqrt(n)) for n in counts},
             "expected_by_share": {f"{c:g}": expected(IMUS, c) for c in shares},
@@ -104,17 +92,10 @@ def expected(imus: int, common: float) -> float:
 
 
 def drive(test: str) -> Scenario:
-    """Return the scenario of a test, cut to what the figure needs, without outages."""
-    scenario = nonrigid.scenario_of(test, quick=True)
-    assert scenario.gnss is not None
-    gnss = scenario.gnss.model_copy(update={"phase_s": FIX_PHASE_S})
-    return scenario.model_copy(
-        update={
-            "seed": nonrigid.FIRST_SEED,
-            "duration_s": scenario.static_s + DRIVE_S,
-            "gnss": gnss,
-            "outages": (),
-        }
+    """Return the scenario of a test with what the figure has otherwise."""
+    own = SCENARIOS["six filters"]
+    return nonrigid.scenario_of(test, quick=False).model_copy(
+        update={key: getattr(own, key) for key in own.model_fields_set}
     )
 
 
@@ -124,16 +105,16 @@ def six_filters(test: str) -> tuple[Array, Array]:
     truth = true_run(scenario)
     recording = record(truth, seed=scenario.seed).recording
     for number, imu in enumerate(recording.rig.imus):
-        alone = replace(recording.subset([number]), start=_start(truth.path, imu.position, scenario.static_s))
+        alone = replace(recording.subset([number]), start=_start(truth.path, imu.position, scenario))
         solution = batch.run(alone, "single")
         std.append(np.sqrt(solution.position_variance))
     return solution.time - scenario.static_s, np.array(std)
 
 
-def _start(path: Path, place: Array, static: float) -> StartOptions:
+def _start(path: Path, place: Array, scenario: Scenario) -> StartOptions:
     """Return a start in motion, from the truth of an IMU's place and the same std for all."""
+    static, std = scenario.static_s, scenario.start_std
     truth = path.truth([static + SHOWN[0]], place)
-    position_std, velocity_std, attitude_std = START_STD
     return StartOptions(
         time=float(truth.time[0]),
         end_time=static + SHOWN[1],
@@ -142,9 +123,9 @@ def _start(path: Path, place: Array, static: float) -> StartOptions:
         roll_pitch=truth.attitude[0, :2],
         heading=float(truth.attitude[0, 2]),
         heading_from="value",
-        position_std=np.full(3, position_std),
-        velocity_std=np.full(3, velocity_std),
-        attitude_std=np.array(attitude_std) * DEG,
+        position_std=np.array(std.position_m),
+        velocity_std=np.array(std.velocity_m_s),
+        attitude_std=np.array(std.attitude_deg) * DEG,
         estimate_gyro_bias=False,
     )
 
@@ -160,7 +141,7 @@ def around_first_fix(time: Array, std: Array) -> dict[str, list[float]]:
 
 
 def _with_common(truth: TrueRun, common: float, imus: int) -> TrueRun:
-    errors = MODELLED.model_copy(update={"common_noise_share": common, "common_drift_share": common})
+    errors = truth.scenario.errors.model_copy(update={"common_noise_share": common, "common_drift_share": common})
     scenario = truth.scenario.model_copy(update={"errors": errors, "imus": Board(count=imus)})
     return replace(truth, scenario=scenario)
 

@@ -16,6 +16,7 @@ from polyins.evaluation.errors import Errors, compare_to_reference
 from polyins.recording import Recording
 from polyins.reproduce import rigid_array
 from polyins.reproduce.pictures import lines, write_figure
+from polyins.simulation.run import true_run
 
 SEED = 1
 """Group 1's in Table III"""
@@ -29,7 +30,7 @@ def reproduce(
     """Return the rms errors inside and outside the outages; `quick` takes the first eleven at 20 Hz."""
     scenario = rigid_array.base_scenario(quick)
     chips = rigid_array.group_chips(1, scenario.imus.count)
-    run = rigid_array.with_errors(rigid_array.drive(scenario), scenario.errors.model_copy(update={"chips": chips}))
+    run = rigid_array.with_errors(true_run(scenario), scenario.errors.model_copy(update={"chips": chips}))
     recording = rigid_array.recording_of(run, SEED)
     assert recording.reference is not None
     errors = compare_to_reference(batch.run(recording, "enav-fusion", progress=progress), recording.reference)
@@ -42,7 +43,7 @@ def reproduce(
         "settings": {
             "track": rigid_array.provenance(),
             "outages": len(recording.outages),
-            "scenario": scenario.model_dump(mode="json", exclude={"track", "wheels"}),
+            "scenario": scenario.model_dump(mode="json", exclude=rigid_array.ELSEWHERE),
         },
     }
 

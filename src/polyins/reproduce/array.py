@@ -9,26 +9,15 @@ import numpy as np
 
 from polyins.comparison import compare
 from polyins.evaluation.summary import figure
-from polyins.simulation.scenario import Errors, Fixes, Scenario, simulate
+from polyins.reproduce.scenario_files import scenarios
+from polyins.simulation.scenario import simulate
 
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
 SEEDS = 10
 QUICK_SEEDS = 1
 QUICK_RATE_HZ = 50.0
 
-GNSS = Fixes(position_std_m=(0.013, 0.010, 0.023))
-"""Median std of the track in the public data of paper A's lab (data set whu-array)."""
-EXACT_GNSS = Fixes(position_std_m=(1e-4, 1e-4, 1e-4))
-MODELLED = Errors(turn_on_share=0.5)
-"""Half of the variance of biases and scale factors stays constant, as in real chips, the rest drifts."""
-
-SCENARIOS = {
-    # all IMUs see the same fixes, so with independent errors only, the fixes have none to speak of
-    "independent": Scenario(gnss=EXACT_GNSS, errors=MODELLED),
-    "as modelled": Scenario(gnss=GNSS, errors=MODELLED),
-    # spread of the chips of that array: 0.16 to 0.26 deg
-    "chips": Scenario(gnss=GNSS, errors=MODELLED.model_copy(update={"misalignment_deg": 0.2})),
-}
+SCENARIOS = scenarios("array")
 
 
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> dict[str, Any]:

@@ -10,23 +10,29 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.config import Number, Section, Triple
 from polyins.recording import ImuStream
+from polyins.reproduce.scenario_files import read
 from polyins.rig import DEG
 from polyins.simulation.error_scenario import IDENTITY, ChipCalibration, Matrix
 
 Array = NDArray[np.float64]
 Chips = tuple[ChipCalibration, ...]
 
-GYRO_SCALE_PPM = (2806.0, 1028.0, 689.0), (1238.0, 1250.0, 2029.0)
-"""mean and std over the chips, likewise below"""
-ACCEL_SCALE_PPM = (-279.0, -967.0, 672.0), (660.0, 761.0, 1428.0)
-ROTATION_DEG = (0.75, 0.01, -0.37), (0.21, 0.21, 0.21)
-"""of the chip; the mean is the board's"""
-GYRO_SKEW_DEG = 0.085
-ACCEL_SKEW_DEG = 0.024
-GYRO_OFFSET_DEG_H = (3579.0, 2037.0, 1281.0)
-"""std; the mean is no property of the chips"""
-ACCEL_OFFSET_MGAL = (11157.0, 6541.0, 13576.0)
+
+class Statistics(Section):
+    """Mean and std over the chips about each axis, x, y, z."""
+
+    gyro_scale_mean_ppm: Triple
+    gyro_scale_std_ppm: Triple
+    accel_scale_mean_ppm: Triple
+    accel_scale_std_ppm: Triple
+    rotation_mean_deg: Triple
+    rotation_std_deg: Triple
+    gyro_skew_std_deg: Number
+    accel_skew_std_deg: Number
+    gyro_offset_std_deg_h: Triple
+    accel_offset_std_mgal: Triple
 
 
 def read_chips(folder: Path) -> Chips:
@@ -37,8 +43,9 @@ def read_chips(folder: Path) -> Chips:
 
 
 def draw_chips(count: int, rng: np.random.Generator) -> Chips:
-    """Draw chips from the statistics of Group 1's."""
-    return tuple(_draw(rng) for _ in range(count))
+    """Draw chips from the statistics of Group 1's, `chips.yaml`."""
+    statistics = read(Statistics, "chips")
+    return tuple(_draw(statistics, rng) for _ in range(count))
 
 
 def parts_of(chips: Chips) -> dict[str, Chips]:
@@ -56,17 +63,20 @@ def _diagonal(matrix: Matrix) -> Matrix:
     return (xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz)
 
 
-def _draw(rng: np.random.Generator) -> ChipCalibration:
+def _draw(chip: Statistics, rng: np.random.Generator) -> ChipCalibration:
     from scipy.spatial.transform import Rotation
 
-    rotation = Rotation.from_rotvec(rng.normal(*ROTATION_DEG) * DEG).as_matrix()
+    rotation = Rotation.from_rotvec(rng.normal(chip.rotation_mean_deg, chip.rotation_std_deg) * DEG).as_matrix()
     matrices = []
-    for (mean, std), skew in ((GYRO_SCALE_PPM, GYRO_SKEW_DEG), (ACCEL_SCALE_PPM, ACCEL_SKEW_DEG)):
+    for mean, std, skew in (
+        (chip.gyro_scale_mean_ppm, chip.gyro_scale_std_ppm, chip.gyro_skew_std_deg),
+        (chip.accel_scale_mean_ppm, chip.accel_scale_std_ppm, chip.accel_skew_std_deg),
+    ):
         square = np.eye(3)
         square[np.tril_indices(3, -1)] = rng.normal(0.0, skew * DEG, 3)
         matrices.append(np.diag(1.0 + 1e-6 * rng.normal(mean, std)) @ square @ rotation)
-    gyro_offset = rng.normal(0.0, GYRO_OFFSET_DEG_H) / 3600.0
-    accel_offset = rng.normal(0.0, ACCEL_OFFSET_MGAL) * 1e-5
+    gyro_offset = rng.normal(0.0, chip.gyro_offset_std_deg_h) / 3600.0
+    accel_offset = rng.normal(0.0, chip.accel_offset_std_mgal) * 1e-5
     return _entry(matrices[0], gyro_offset, matrices[1], accel_offset)
 
 

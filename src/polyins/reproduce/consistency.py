@@ -16,9 +16,10 @@ from polyins.evaluation.consistency import nees, nees_bounds, share_inside
 from polyins.geodesy import metres_per_unit
 from polyins.kernels import share
 from polyins.recording import StartOptions
+from polyins.reproduce.scenario_files import read
 from polyins.rig import DEG
 from polyins.simulation.path import Path, Truth
-from polyins.simulation.scenario import Board, Scenario, simulate_with_truth
+from polyins.simulation.scenario import Scenario, StartStd, simulate_with_truth
 
 Array = NDArray[np.float64]
 
@@ -26,15 +27,12 @@ SEEDS = 50
 QUICK_SEEDS = 10
 STATES = 9
 STARTS_AT = 1.0  # s
-POSITION_STD = np.array([0.05, 0.05, 0.1])  # m
-VELOCITY_STD = np.full(3, 0.05)  # m/s
-ATTITUDE_STD = np.array([0.1, 0.1, 0.5]) * DEG
 
 
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
     """Run one IMU on each of fifty drives from a start with errors of its stated size, and return the document."""
     seeds = QUICK_SEEDS if quick else SEEDS
-    scenario = Scenario(duration_s=300.0, imus=Board(count=1))
+    scenario = read(Scenario, "consistency")
     errors, covariances = [], []
     for seed in range(seeds):
         error, covariance = errors_of(scenario, seed)
@@ -60,7 +58,7 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
 def errors_of(scenario: Scenario, seed: int) -> tuple[Array, Array]:
     """Return the errors at whole seconds, shape (T, 9), and the filter's covariance of them, (T, 9, 9)."""
     simulation = simulate_with_truth(scenario, seed=seed)
-    start = _start(simulation.path, np.random.default_rng([seed, 1]))
+    start = _start(simulation.path, scenario.start_std, np.random.default_rng([seed, 1]))
     run = batch.prepare(replace(simulation.recording, start=start), "single")
     every = run.plan.log_every
     covariances = []
@@ -73,25 +71,27 @@ def errors_of(scenario: Scenario, seed: int) -> tuple[Array, Array]:
     return navigation_errors(run.outputs.states[rows], truth), np.array(covariances)
 
 
-def _start(path: Path, rng: np.random.Generator) -> StartOptions:
+def _start(path: Path, told: StartStd, rng: np.random.Generator) -> StartOptions:
     """Return the true state with errors drawn from the standard deviations that the filter is told."""
     truth = path.truth(np.array([STARTS_AT]))
+    position_std, velocity_std = np.array(told.position_m), np.array(told.velocity_m_s)
+    attitude_std = np.array(told.attitude_deg) * DEG
     metres = metres_per_unit(truth.position[0], True)
     # the error of attitude is phi: C_hat = (I - phi x) C
-    phi = rng.normal(0.0, ATTITUDE_STD)
+    phi = rng.normal(0.0, attitude_std)
     c = rotation_matrix(truth.attitude[0])
     from scipy.spatial.transform import Rotation
 
     heading, pitch, roll = (Rotation.from_rotvec(-phi) * Rotation.from_matrix(c)).as_euler("ZYX")
     return StartOptions(
         time=STARTS_AT,
-        position=truth.position[0] + rng.normal(0.0, POSITION_STD) / metres,
-        velocity=truth.velocity[0] + rng.normal(0.0, VELOCITY_STD),
+        position=truth.position[0] + rng.normal(0.0, position_std) / metres,
+        velocity=truth.velocity[0] + rng.normal(0.0, velocity_std),
         roll_pitch=np.array([roll, pitch]),
         heading=float(heading),
-        position_std=POSITION_STD,
-        velocity_std=VELOCITY_STD,
-        attitude_std=ATTITUDE_STD,
+        position_std=position_std,
+        velocity_std=velocity_std,
+        attitude_std=attitude_std,
         estimate_gyro_bias=False,
     )
 

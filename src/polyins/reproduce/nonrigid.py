@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,9 @@ from numpy.typing import NDArray
 
 from polyins.recording import ImuStream, Recording
 from polyins.reproduce.rigid_array import rms
+from polyins.reproduce.scenario_files import read
 from polyins.simulation.run import record, true_run
-from polyins.simulation.scenario import Scenario, read_scenario
+from polyins.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -22,15 +22,13 @@ FIRST_SEED = 2000
 """those from 1000 on were used while books, tyres, clamps and ground were settled"""
 QUICK_S = 330.0
 
-FILES = {"rigid": "lawn.yaml", "test A": "lawn.yaml", "test B": "books.yaml"}
+FILES = {"rigid": "lawn", "test A": "lawn", "test B": "books"}
 """The rigid array is that of test A on rulers that do not bend, on the same lawn."""
 
 
 def scenario_of(test: str, quick: bool) -> Scenario:
     """Return the scenario of a test, of which `quick` takes the first part."""
-    with resources.as_file(resources.files("polyins.reproduce") / FILES[test]) as file:
-        scenario = read_scenario(file)
-    scenario = with_rulers(scenario, stiff=test == "rigid")
+    scenario = with_rulers(read(Scenario, FILES[test]), stiff=test == "rigid")
     if not quick:
         return scenario
     outages = tuple(outage for outage in scenario.outage_intervals() if outage[1] <= QUICK_S)

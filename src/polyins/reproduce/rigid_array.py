@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from importlib import resources
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,71 +15,45 @@ from polyins.evaluation.errors import compare_to_reference
 from polyins.evaluation.outages import outage_statistic
 from polyins.recording import Recording
 from polyins.reproduce.chips import Chips, compensate, draw_chips, read_chips
-from polyins.rig import DEG
+from polyins.reproduce.scenario_files import read
 from polyins.simulation.error_scenario import Errors
-from polyins.simulation.increments import increments
-from polyins.simulation.path import Path
-from polyins.simulation.replay import replay
-from polyins.simulation.run import TrueRun, record, true_run
-from polyins.simulation.scenario import Scenario, read_scenario
+from polyins.simulation.run import TrueRun, record
+from polyins.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]
 
 DATASET = "whu-array"
-FIRST, LAST = 270769.0, 273689.0
-"""s of week: 60 s before the car first moves, and the end of the last outage"""
 QUICK_S = 1300.0
 QUICK_RATE_HZ = 20.0
+ELSEWHERE = {"replay": {"file"}}
+"""of the scenario: where the data set is depends on the machine"""
 
 
 def base_scenario(quick: bool) -> Scenario:
-    """Return the scenario of the file, shorter and slower if `quick`."""
-    with resources.as_file(resources.files("polyins.reproduce") / "a3.yaml") as file:
-        scenario = read_scenario(file)
-    return scenario.model_copy(update={"duration_s": QUICK_S, "rate_hz": QUICK_RATE_HZ}) if quick else scenario
+    """Return the scenario of the file, shorter and slower if `quick`.
+
+    It replays the real track; where the data set is not at hand, a drive of its own stands in.
+    """
+    scenario, folder = read(Scenario, "a3"), data_folder()
+    assert scenario.replay is not None
+    track = folder and scenario.replay.model_copy(update={"file": str(folder / scenario.replay.file)})
+    shorter = {"duration_s": QUICK_S, "rate_hz": QUICK_RATE_HZ} if quick else {}
+    return scenario.model_copy(update={"replay": track, **shorter})
 
 
-def real_chips() -> Chips | None:
-    """Return Group 1's chips, or None where the data set is not at hand."""
+def data_folder() -> Path | None:
+    """Return the folder of the data set, or None where it is not at hand."""
     try:
-        return read_chips(datasets.fetch(DATASET))
+        return datasets.fetch(DATASET)
     except InputError:
         return None
-
-
-def real_path(duration: float) -> Path | None:
-    """Return the first seconds of the replayed track, or None where the data set is not at hand."""
-    try:
-        folder = datasets.fetch(DATASET)
-    except InputError:
-        return None
-    rows = np.loadtxt(folder / "gnss_group1.txt")
-    rows = rows[(rows[:, 0] >= FIRST) & (rows[:, 0] <= min(FIRST + duration, LAST))]
-    position = np.column_stack([rows[:, 1:3] * DEG, rows[:, 3]])
-    return replay(rows[:, 0], position, rows[:, 4:7])
 
 
 def provenance() -> str:
     """Say what the track and Group 1's chips are."""
-    if real_chips() is None:
+    if data_folder() is None:
         return f"a simulated drive and drawn chips stand in: the data set {DATASET} is not at hand"
     return f"real, data set {DATASET}"
-
-
-def drive(scenario: Scenario) -> TrueRun:
-    """Return the truth on the real track, or on a simulated drive where the data set is not at hand."""
-    path = real_path(scenario.duration_s)
-    if path is None:
-        return true_run(scenario)
-    fitted = scenario.model_copy(
-        update={
-            "duration_s": path.duration,
-            "static_s": path.static,
-            "path_seed": scenario.seed,
-            "outages": scenario.outage_intervals(),
-        }
-    )
-    return TrueRun(fitted, path, increments(path, fitted.rate_hz), (), ())
 
 
 def with_errors(run: TrueRun, errors: Errors) -> TrueRun:
@@ -89,8 +63,8 @@ def with_errors(run: TrueRun, errors: Errors) -> TrueRun:
 
 def group_chips(number: int, count: int) -> Chips:
     """Return the chips of a group, counted from 1: the real ones of Group 1 if at hand, else drawn ones."""
-    real = real_chips() if number == 1 else None
-    return real or draw_chips(count, np.random.default_rng([number, 20602]))
+    folder = data_folder() if number == 1 else None
+    return read_chips(folder) if folder else draw_chips(count, np.random.default_rng([number, 20602]))
 
 
 def recording_of(run: TrueRun, seed: int) -> Recording:

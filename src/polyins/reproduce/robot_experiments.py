@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.alignment import rotation_matrix
-from polyins.config import Noise
+from polyins.config import Noise, Positive, Section
 from polyins.recording import Recording
 from polyins.reproduce.robot import WINDOW, as_in_the_paper
+from polyins.reproduce.scenario_files import read
 from polyins.reproduce.sites import Site
-from polyins.reproduce.vehicles import CHIPS, FILTER_NOISE, GYRO_SCALE_PPM, PRINTED_GYRO_SCALE_PPM, ROBOT
-from polyins.rig import DEG, Imu, Wheel
+from polyins.reproduce.vehicles import CHIPS, FILTER_NOISE, GYRO_SCALE_PPM, ROBOT
+from polyins.rig import DEG, HOUR, Imu, Wheel
 from polyins.simulation import earth
 from polyins.simulation.run import TrueRun, record, true_run
 from polyins.simulation.scenario import Errors
@@ -29,18 +30,28 @@ Array = NDArray[np.float64]
 World = Literal["plane", "turning", "slip", "level"]
 """as in the scenario; on the Earth, which turns; with slip; without slopes"""
 
+
+class Sizes(Section):
+    """By how much each experiment differs; `experiments.yaml` says where from."""
+
+    printed_gyro_scale_ppm: Positive
+    low_gyro_scale_ppm: Positive
+    wandering_bias_deg_h: Positive
+    wandering_time_s: Positive
+    misalignment_deg: Positive
+    radius_error: Positive
+    """of the radius"""
+    lever_arm_error_m: Positive
+    heading_error_deg: Positive
+    tilt_deg: Positive
+    clock_error_s: Positive
+    slip: Slip
+
+
+SIZES = read(Sizes, "experiments")
 CONSTANT = ROBOT.base.errors
-DRIFTING = Errors(turn_on_share=1.0 - (25.0 / 200.0) ** 2)
-"""25 of the 200 deg/h wander"""
-DRIFT_TIME_H = 600.0 / 3600.0
-CHIP_MISALIGNMENT_DEG = 0.2
-LOW_SCALE_PPM = 5000.0
-RADIUS_ERROR = 0.005
-LEVER_ARM_ERROR_M = 0.003
-HEADING_ERROR = 0.5 * DEG
-TILT = 0.5 * DEG
-CLOCK_ERROR_S = 0.005
-SLIP = Slip(size=0.2, length_s=1.0, every_s=30.0)
+WANDERING = Errors(turn_on_share=1.0 - (SIZES.wandering_bias_deg_h / CHIPS.gyro_bias_deg_h[0]) ** 2)
+WANDERING_TIME_H = SIZES.wandering_time_s / HOUR
 FIELD_SEEDS = 3
 
 
@@ -82,7 +93,7 @@ def truth(site: Site, world: World = "plane") -> TrueRun:
     if world == "level":
         return true_run(site.scenario(level=True))
     if world == "slip":
-        return true_run(site.scenario(slip=SLIP))
+        return true_run(site.scenario(slip=SIZES.slip))
     return true_run(site.scenario(earth=world))
 
 
@@ -116,25 +127,29 @@ def with_wheels(recording: Recording, change: Callable[[Wheel], Wheel]) -> Recor
 
 def wrong_radius(recording: Recording) -> Recording:
     """Return the recording with radii that are too large."""
-    return with_wheels(recording, lambda wheel: replace(wheel, radius=wheel.radius * (1.0 + RADIUS_ERROR)))
+    return with_wheels(recording, lambda wheel: replace(wheel, radius=wheel.radius * (1.0 + SIZES.radius_error)))
 
 
 def wrong_lever_arm(recording: Recording) -> Recording:
     """Return the recording with lever arms that are off in the plane of the wheel."""
-    off = np.array([0.0, LEVER_ARM_ERROR_M, LEVER_ARM_ERROR_M])
+    off = np.array([0.0, SIZES.lever_arm_error_m, SIZES.lever_arm_error_m])
     return with_wheels(recording, lambda wheel: replace(wheel, lever_arm=wheel.lever_arm + off))
 
 
 def wrong_heading(recording: Recording) -> Recording:
     """Return the recording with a start heading that is off."""
     assert recording.start.heading is not None
-    return replace(recording, start=replace(recording.start, heading=recording.start.heading + HEADING_ERROR))
+    heading = recording.start.heading + SIZES.heading_error_deg * DEG
+    return replace(recording, start=replace(recording.start, heading=heading))
 
 
 def tilted_modules(recording: Recording) -> Recording:
     """Return the recording with each module turned about its y and z axes, by drawn angles."""
     rng = np.random.default_rng(0)
-    turned = {name: rotation_matrix(np.array([0.0, *rng.normal(0.0, TILT, 2)])) for name in recording.rig.modules()}
+    turned = {
+        name: rotation_matrix(np.array([0.0, *rng.normal(0.0, SIZES.tilt_deg * DEG, 2)]))
+        for name in recording.rig.modules()
+    }
     streams = tuple(
         replace(stream, dtheta=stream.dtheta @ turned[imu.module], dvel=stream.dvel @ turned[imu.module])
         for imu, stream in zip(recording.rig.imus, recording.imus, strict=True)
@@ -144,7 +159,7 @@ def tilted_modules(recording: Recording) -> Recording:
 
 def late_clocks(recording: Recording) -> Recording:
     """Return the recording with the right wheel's stamps too late and the body's too early."""
-    offset = {"left": 0.0, "right": CLOCK_ERROR_S, "body": -CLOCK_ERROR_S}
+    offset = {"left": 0.0, "right": SIZES.clock_error_s, "body": -SIZES.clock_error_s}
     streams = tuple(
         replace(stream, time=stream.time + offset[imu.module])
         for imu, stream in zip(recording.rig.imus, recording.imus, strict=True)
@@ -170,8 +185,8 @@ def _in_the_field(gyro_scale_ppm: float, source: str) -> Experiment:
     return Experiment(
         source,
         world="turning",
-        errors=DRIFTING.model_copy(update={"misalignment_deg": CHIP_MISALIGNMENT_DEG}),
-        noise=grade(CHIPS, gyro_scale_ppm=gyro_scale_ppm, correlation_time_h=DRIFT_TIME_H),
+        errors=WANDERING.model_copy(update={"misalignment_deg": SIZES.misalignment_deg}),
+        noise=grade(CHIPS, gyro_scale_ppm=gyro_scale_ppm, correlation_time_h=WANDERING_TIME_H),
         change=in_the_field,
         seeds=FIELD_SEEDS,
     )
@@ -192,7 +207,9 @@ EXPERIMENTS: dict[str, Experiment] = {
         "plausible after a calibration that found 3.4 and 1.3 deg; not published", change=tilted_modules
     ),
     "clocks 5 ms off": Experiment("right against left, body the other way; one sample of 200 Hz", change=late_clocks),
-    "gyro scale 0.03": Experiment("as Table III prints it", noise=grade(CHIPS, gyro_scale_ppm=PRINTED_GYRO_SCALE_PPM)),
+    "gyro scale 0.03": Experiment(
+        "as Table III prints it", noise=grade(CHIPS, gyro_scale_ppm=SIZES.printed_gyro_scale_ppm)
+    ),
     "turning earth": Experiment("the Earth turns and the filter knows", world="turning"),
     "no gyro scale": Experiment("what everything else in Table III makes", noise=_scales(0.0, 0.0)),
     "gyro scale about the axle": Experiment("of the x gyro only", noise=_scales(GYRO_SCALE_PPM, 0.0)),
@@ -210,24 +227,24 @@ EXPERIMENTS: dict[str, Experiment] = {
     ),
     "wandering biases": Experiment(
         "25 of the 200 deg/h and an eighth of the other errors wander within 600 s, as such chips do",
-        errors=DRIFTING,
-        noise=grade(CHIPS, correlation_time_h=DRIFT_TIME_H),
+        errors=WANDERING,
+        noise=grade(CHIPS, correlation_time_h=WANDERING_TIME_H),
     ),
     "misaligned triads": Experiment(
         "0.2 deg about each axis, the spread of these chips in whu-array",
-        errors=CONSTANT.model_copy(update={"misalignment_deg": CHIP_MISALIGNMENT_DEG}),
+        errors=CONSTANT.model_copy(update={"misalignment_deg": SIZES.misalignment_deg}),
     ),
     "slip": Experiment("up to 20 % for 1 s, every 30 s, each wheel; plausible, not published", world="slip"),
     "level ground": Experiment("no slopes; the robot's scenario has some", world="level"),
     "gyro scale 0.005": Experiment(
-        "half of the 1 % that the chip's data sheet allows", noise=grade(CHIPS, gyro_scale_ppm=LOW_SCALE_PPM)
+        "half of the 1 % that the chip's data sheet allows", noise=grade(CHIPS, gyro_scale_ppm=SIZES.low_gyro_scale_ppm)
     ),
     "in the field": _in_the_field(
         GYRO_SCALE_PPM,
         "no earth rate, wandering biases, misaligned triads, radius, lever arm, heading and tilt together",
     ),
-    "in the field, gyro scale 0.005": _in_the_field(LOW_SCALE_PPM, "the last two together"),
+    "in the field, gyro scale 0.005": _in_the_field(SIZES.low_gyro_scale_ppm, "the last two together"),
     "in the field, gyro scale 0.005, window": replace(
-        _in_the_field(LOW_SCALE_PPM, "predicted over the same 0.1 s"), predict="window"
+        _in_the_field(SIZES.low_gyro_scale_ppm, "predicted over the same 0.1 s"), predict="window"
     ),
 }

@@ -14,6 +14,7 @@ from polyins.reproduce import flights, rigid_array
 from polyins.reproduce.pictures import lines, write_figure
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.rigid_array import maxima, rms
+from polyins.simulation.run import true_run
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -37,7 +38,7 @@ def reproduce(
     scenario = rigid_array.base_scenario(quick)
     chips = rigid_array.group_chips(1, scenario.imus.count)
     errors = scenario.errors.model_copy(update={"chips": chips})
-    run = rigid_array.with_errors(rigid_array.drive(scenario), errors)
+    run = rigid_array.with_errors(true_run(scenario), errors)
     simulated = by_imus(rigid_array.recording_of(run, SEED), steps.next())
     flown = fly(quick, steps.next())
     if out is not None:

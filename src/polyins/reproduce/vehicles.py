@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import resources
 from pathlib import Path as FilePath
 from typing import Any, Literal
 
 from polyins.config import Noise
-from polyins.simulation.scenario import Errors, Scenario, read_scenario
-from polyins.simulation.wheel_scenario import Slip, Track
+from polyins.reproduce.scenario_files import read, scenarios
+from polyins.simulation.scenario import Errors, Scenario
+from polyins.simulation.wheel_scenario import Laps, Slip, Track
 
 Earth = Literal["turning", "plane"]
-
-PRINTED_GYRO_SCALE_PPM = 30_000.0
-"""Table III's"""
 
 
 @dataclass(frozen=True)
@@ -29,9 +26,18 @@ class Vehicle:
 
     @cached_property
     def base(self) -> Scenario:
-        """The scenario of its file, which drives laps."""
-        with resources.as_file(resources.files("polyins.reproduce") / f"{self.name}.yaml") as file:
-            return read_scenario(file)
+        """The scenario of its file; where its track is, a data set's folder says."""
+        return read(Scenario, self.name)
+
+    @cached_property
+    def laps(self) -> Laps | None:
+        """What stands in for its track."""
+        return scenarios("laps")[self.name].laps
+
+    def _track(self, folder: FilePath) -> Track:
+        track = self.base.track
+        assert track is not None
+        return track.model_copy(update={key: str(folder / getattr(track, key)) for key in ("file", "odometer")})
 
     def scenario(
         self,
@@ -50,13 +56,9 @@ class Vehicle:
         chips are; `errors`: which errors they have; `slip`: of both wheels; `duration_s`: how long it drives at most;
         those of the file unless given. The filter knows the radius that fits each chip's gyro.
         """
-        laps = self.base.laps
-        assert laps is not None
-        terrain = {"slope_deg": 0.0 if level else laps.slope_deg, "slope_length_m": laps.slope_length_m}
-        way: dict[str, Any] = {"laps": laps.model_copy(update=terrain)}
-        if folder:
-            track = Track(file=str(folder / "track.csv"), odometer=str(folder / "odometer.csv"), **terrain)
-            way = {"laps": None, "track": track}
+        way: dict[str, Any] = {"track": self._track(folder) if folder else None, "laps": None if folder else self.laps}
+        if level:
+            way = {key: ground and ground.model_copy(update={"slope_deg": 0.0}) for key, ground in way.items()}
         given: dict[str, Any] = {"earth": earth, "noise": noise, "errors": errors, "duration_s": duration_s}
         if slip:
             given["wheels"] = tuple(wheel.model_copy(update={"slip": slip}) for wheel in self.base.wheels)

@@ -81,16 +81,6 @@ def foot_of(ruler: Ruler) -> Array:
 
 
 @kernel
-def orientation(d: float, twist: float, pitch: float, roll: float, per_metre: float, C: Array) -> None:
-    """Write C_ps, 3 x 3, of a module whose ruler bends by d, m, and turns by `per_metre` times that."""
-    g = roll + per_metre * d
-    sg, sp, sb, cg, cp, cb = sin(g), sin(pitch), sin(twist), cos(g), cos(pitch), cos(twist)
-    C[0, 0], C[0, 1], C[0, 2] = cp * cb - sp * cg * sb, sp * sg, cp * sb + sp * cg * cb
-    C[1, 0], C[1, 1], C[1, 2] = sg * sb, cg, -sg * cb
-    C[2, 0], C[2, 1], C[2, 2] = -sp * cb - cp * cg * sb, cp * sg, -sp * sb + cp * cg * cb
-
-
-@kernel
 def tip_motion(motion: Array, change: Array, flexing: Array, shape: Array, moved: Array) -> None:
     """Write how an IMU moves relative to the smooth path p.
 
@@ -101,11 +91,13 @@ def tip_motion(motion: Array, change: Array, flexing: Array, shape: Array, moved
     rise, pitching, rolling = change[0], change[1], change[2]
     d, b, d_rate, b_rate = flexing[0], flexing[1], flexing[2], flexing[3]
     per_metre, short, h = shape[3], shape[4], shape[5]
-    orientation(d, b, pitch, roll, per_metre, moved[:9].reshape(3, 3))
     g, g_rate = roll + per_metre * d, rolling + per_metre * d_rate
     sg, sp, sb, sr, cg, cp, cb, cr = (
         sin(g), sin(pitch), sin(b), sin(roll), cos(g), cos(pitch), cos(b), cos(roll)
     )  # fmt: skip
+    moved[0], moved[1], moved[2] = cp * cb - sp * cg * sb, sp * sg, cp * sb + sp * cg * cb
+    moved[3], moved[4], moved[5] = sg * sb, cg, -sg * cb
+    moved[6], moved[7], moved[8] = -sp * cb - cp * cg * sb, cp * sg, -sp * sb + cp * cg * cb
     across = -pitching * sg
     moved[9], moved[10], moved[11] = g_rate * cb - across * sb, pitching * cg + b_rate, g_rate * sb + across * cb
     # the tip from the array origin, turned by the roll

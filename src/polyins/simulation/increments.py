@@ -53,11 +53,16 @@ class Increments:
         return np.einsum("tj,ji->ti", self.dtheta, C_ab), np.einsum("tj,ji->ti", dvel, C_ab)
 
 
+def stamps(path: Path, rate_hz: float) -> Array:
+    """Return the ends of the intervals along a path, s, shape (T,)."""
+    return np.arange(1.0, np.floor(path.duration * rate_hz + 1e-6) + 1.0) / rate_hz
+
+
 def increments(path: Path, rate_hz: float = 200.0) -> Increments:
     """Return the error-free increments along a path; the first interval starts at time 0."""
     interval = 1.0 / rate_hz
-    count = int(np.floor(path.duration * rate_hz + 1e-6))
-    edges = np.arange(count + 1) / rate_hz
+    edges = np.append(0.0, stamps(path, rate_hz))
+    count = edges.size - 1
     dtheta, dvel, lever = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3, 3))
     for first in range(0, count, BLOCK):
         part = slice(first, min(first + BLOCK, count))

@@ -11,10 +11,6 @@ SPACING = 0.5
 """m between points"""
 SPEED_INTERVAL = 0.5
 """s"""
-SPEEDING = 40.0
-"""s from one time of greatest speed to the next"""
-STARTING = 10.0
-"""s until the speed is reached, and from when it falls to rest"""
 
 
 def lap_length(length: float, width: float, corner: float) -> float:
@@ -35,8 +31,11 @@ def lap_points(length: float, width: float, corner: float, count: int) -> tuple[
     return np.cumsum(step * np.cos(middle)), np.cumsum(step * np.sin(middle))
 
 
-def lap_speeds(way: float, mean: float, change: float) -> tuple[Array, Array]:
-    """Return times, s, and speeds, m/s, shape (S,) each, of a way, m, at a mean speed that goes up and down."""
+def lap_speeds(way: float, mean: float, *, change: float, every: float, starting: float) -> tuple[Array, Array]:
+    """Return times, s, and speeds, m/s, shape (S,) each, of a way, m, at a mean speed.
+
+    It goes up and down by `change`, m/s, once in `every` s, and rises from rest and falls to it within `starting` s.
+    """
     time = np.arange(0.0, way / mean, SPEED_INTERVAL)
-    speed = mean - change * np.cos(2.0 * np.pi * time / SPEEDING)
-    return time, speed * np.minimum(1.0, np.minimum(time, time[-1] - time) / STARTING)
+    speed = mean - change * np.cos(2.0 * np.pi * time / every)
+    return time, speed * np.minimum(1.0, np.minimum(time, time[-1] - time) / starting)

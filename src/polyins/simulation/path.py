@@ -29,15 +29,6 @@ POSITION_STEP = 0.01  # s; the cubic between such nodes is exact to nanometres
 PICARD_STEPS = 4  # each shrinks the error by distance over Earth radius
 PEAK = 35.0 / 16.0  # of the derivative of the smooth step, over its mean
 
-TOP_SPEED = 16.0  # m/s
-LONGITUDINAL_LIMIT = 2.0  # m/s^2
-LATERAL_LIMIT = 2.0  # m/s^2
-TURN_RADIUS = 10.0  # m
-SLOPE_STD = 1.5 * DEG
-SLOPE_LIMIT = 4.0 * DEG
-CAMBER_STD = 0.7 * DEG
-ROLL_PER_ACCELERATION = 0.6 * DEG  # per m/s^2; the body leans out of the turn
-
 
 class Curve(Protocol):
     """A function of time and its derivatives."""
@@ -124,6 +115,8 @@ class Path:
     """what it lies on"""
     side_speed: Curve | None = None
     """m/s along the body's y axis, where the body slips sideways"""
+    warnings: tuple[str, ...] = ()
+    """what is doubtful about the data that it was made from"""
 
     def truth(self, time: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> Truth:
         """Return the true state at times, shape (T,), of a point given in the array frame, m, shape (3,).
@@ -175,6 +168,26 @@ class Path:
         )
 
 
+@dataclass(frozen=True)
+class Driving:
+    """How a road vehicle is driven, and over which roads."""
+
+    top_speed: float = 16.0
+    """m/s"""
+    acceleration: float = 2.0
+    """m/s^2, at most, along"""
+    lateral_acceleration: float = 2.0
+    """m/s^2, at most"""
+    turn_radius: float = 10.0
+    """m, of the tightest turn"""
+    slope_std: float = 1.5 * DEG
+    steepest: float = 4.0 * DEG
+    """rad: no slope is above this"""
+    camber_std: float = 0.7 * DEG
+    roll_per_acceleration: float = 0.6 * DEG
+    """rad per m/s^2 of lateral acceleration: the body leans out of the turn"""
+
+
 def path(
     speed: Curve,
     roll: Curve,
@@ -214,17 +227,17 @@ def drive(
     static: float = 60.0,
     seed: int | np.random.SeedSequence = 0,
     start: ArrayLike = START,
-    top_speed: float = TOP_SPEED,
+    driving: Driving = Driving(),
     world: World = earth,
 ) -> Path:
     """Return a drive of a road vehicle: a standing start, then turns, slopes and stops.
 
     `duration` includes the standing start of length `static`, both in s; `start` is in the world's coordinates, those
-    of the Earth being latitude rad, longitude rad, ellipsoidal height m; `top_speed` is in m/s. Another seed gives
-    another drive of the same kind.
+    of the Earth being latitude rad, longitude rad, ellipsoidal height m. Another seed gives another drive of the same
+    kind.
     """
     rng = np.random.default_rng(seed)
-    knots = _plan(duration, static, top_speed, rng)
+    knots = _plan(duration, static, driving, rng)
     speed, yaw_rate, pitch, roll = (smooth_steps(knots[:, 0], column) for column in knots[:, 1:].T)
     heading = yaw_rate.antiderivative()
     heading.c[-1] += rng.uniform(-np.pi, np.pi)
@@ -241,19 +254,19 @@ def smooth_steps(time: Array, value: Array) -> PPoly:
     return PPoly(np.stack([*shape, flat, flat, flat, value[:-1]]), time)
 
 
-def _plan(duration: float, static: float, top_speed: float, rng: np.random.Generator) -> Array:
+def _plan(duration: float, static: float, driving: Driving, rng: np.random.Generator) -> Array:
     """Return knots (time, speed, yaw rate, pitch, roll), shape (K, 5), from time 0 beyond the duration.
 
     Speed and yaw rate change by the same smooth step, so between knots the curvature stays within that of the knots.
     """
-    rest = np.array([0.0, 0.0, 0.0, *_road(rng)])
+    rest = np.array([0.0, 0.0, 0.0, *_road(driving, rng)])
     knots = [rest]
     if static > 0.0:
         knots.append(_standing(rest, static))
     while knots[-1][0] <= duration:
         for _ in range(rng.integers(5, 14)):
-            knots.append(_leg(knots[-1], rng.uniform(0.25, 1.0) * top_speed, rng))
-        knots.append(_leg(knots[-1], 0.0, rng))
+            knots.append(_leg(knots[-1], rng.uniform(0.25, 1.0) * driving.top_speed, driving, rng))
+        knots.append(_leg(knots[-1], 0.0, driving, rng))
         knots.append(_standing(knots[-1], rng.uniform(4.0, 15.0)))
     return np.array(knots)
 
@@ -265,19 +278,21 @@ def _standing(knot: Array, length: float) -> Array:
     return later
 
 
-def _leg(last: Array, speed: float, rng: np.random.Generator) -> Array:
+def _leg(last: Array, speed: float, driving: Driving, rng: np.random.Generator) -> Array:
     """Return the next knot of a vehicle that reaches the given speed there."""
-    span = max(rng.uniform(4.0, 9.0), PEAK * abs(speed - last[1]) / LONGITUDINAL_LIMIT)
+    span = max(rng.uniform(4.0, 9.0), PEAK * abs(speed - last[1]) / driving.acceleration)
     turning = rng.uniform(-1.0, 1.0) * (rng.random() < 0.7)
-    yaw_rate = turning * min(LATERAL_LIMIT / speed, speed / TURN_RADIUS) if speed > 0.0 else 0.0
-    pitch, camber = _road(rng)
-    return np.array([last[0] + span, speed, yaw_rate, pitch, camber - ROLL_PER_ACCELERATION * speed * yaw_rate])
+    tightest = min(driving.lateral_acceleration / speed, speed / driving.turn_radius) if speed > 0.0 else 0.0
+    yaw_rate = turning * tightest
+    pitch, camber = _road(driving, rng)
+    lean = driving.roll_per_acceleration * speed * yaw_rate
+    return np.array([last[0] + span, speed, yaw_rate, pitch, camber - lean])
 
 
-def _road(rng: np.random.Generator) -> tuple[float, float]:
+def _road(driving: Driving, rng: np.random.Generator) -> tuple[float, float]:
     """Return slope and camber, rad."""
-    slope, camber = rng.normal(0.0, (SLOPE_STD, CAMBER_STD))
-    return float(np.clip(slope, -SLOPE_LIMIT, SLOPE_LIMIT)), float(camber)
+    slope, camber = rng.normal(0.0, (driving.slope_std, driving.camber_std))
+    return float(np.clip(slope, -driving.steepest, driving.steepest)), float(camber)
 
 
 def _to_level(C_nb: Array, vector: Array) -> Array:

@@ -2,12 +2,13 @@
 
 A quintic smoothing spline through the positions gives the horizontal velocity; its size is the speed and its direction
 the heading, which is held below a speed at which noise would turn it. The slope is that of the smoothed height over the
-way travelled. Camber and the body's lean on its springs are not in the data: they are small plausible ones. The body
-does not slip sideways unless it is asked to.
+way travelled. Camber and how the body moves on its springs are not in the data: `Ride` says them. The body does not
+slip sideways unless it is asked to.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.errors import InputError
 from polyins.geodesy import metres_per_unit
 from polyins.rig import DEG
-from polyins.simulation.path import CAMBER_STD, ROLL_PER_ACCELERATION, Path, path
+from polyins.simulation.path import Path, path
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -31,20 +32,30 @@ HELD_BELOW = 0.7
 """m/s: no heading from the course of slower motion"""
 STANDS_BELOW = 0.15
 """m/s: the spline's wobble while the vehicle stands"""
-SLOPE_SMOOTHING = 10.0
-"""m of way, 1 sigma"""
-CAMBER_LENGTH = 50.0
-"""m of way from one camber to the next"""
-PITCH_PER_ACCELERATION = 0.2 * DEG
-"""per m/s^2; passenger cars dive and squat by 1.5 to 2.5 deg per g"""
 
 
-def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 0, side_slip: float = 0.0) -> Path:
+@dataclass(frozen=True)
+class Ride:
+    """What positions do not tell of a drive: the road's camber, and how the body moves on its springs and tyres."""
+
+    camber_std: float = 0.7 * DEG
+    camber_length: float = 50.0
+    """m of way from one camber to the next"""
+    slope_smoothing: float = 10.0
+    """m of way, 1 sigma, over which the height is smoothed"""
+    roll_per_acceleration: float = 0.6 * DEG
+    """rad per m/s^2: it leans out of the turn"""
+    pitch_per_acceleration: float = 0.2 * DEG
+    """rad per m/s^2: it squats and dives"""
+    side_slip: float = 0.0
+    """rad per m/s^2: in turns the nose points inwards of the course"""
+
+
+def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, ride: Ride = Ride(), seed: int = 0) -> Path:
     """Return the path along positions, (latitude rad, longitude rad, height m), shape (P, 3), at times, s, shape (P,).
 
     `std` is how sure they are, m, north, east, down, shape (P, 3); the path's time 0 is that of the first. `seed` draws
-    the camber. The positions are those of the point that becomes the array origin. In turns the nose points inwards
-    of the course by `side_slip`, rad per m/s^2 of lateral acceleration.
+    the camber. The positions are those of the point that becomes the array origin.
 
     Raises InputError for positions that make no path.
     """
@@ -67,8 +78,8 @@ def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 
     if way[-1] == 0.0:
         raise InputError(f"replay: the positions never move faster than {STANDS_BELOW:g} m/s; expected a drive")
     heading = _course(velocity, speed, way)
-    roll, pitch = _attitude(speed, heading, way, height, np.random.default_rng(seed))
-    inwards = side_slip * speed * np.gradient(heading, STEP)
+    roll, pitch = _attitude(ride, speed, heading, way, height, np.random.default_rng(seed))
+    inwards = ride.side_slip * speed * np.gradient(heading, STEP)
     along = speed / np.cos(pitch)
     # a body that leans slips downwards too: its nose takes that back, for the height is the road's
     pitch = pitch - np.tan(inwards) * np.sin(roll)
@@ -80,7 +91,7 @@ def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, seed: int = 
         duration=float(times[-1] - times[0]),
         static=standing_start(grid, speed),
         start=points[0],
-        side_speed=_curve(grid, -along * np.sin(inwards)) if side_slip else None,
+        side_speed=_curve(grid, -along * np.sin(inwards)) if ride.side_slip else None,
     )
 
 
@@ -112,22 +123,24 @@ def _course(velocity: Array, speed: Array, way: Array) -> Array:
     return np.asarray(np.interp(way, way[fast], course))
 
 
-def _attitude(speed: Array, heading: Array, way: Array, height: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _attitude(
+    ride: Ride, speed: Array, heading: Array, way: Array, height: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
     """Return roll and pitch, rad, shape (G,) each: the road's, and what the springs add."""
     along, across = np.gradient(speed, STEP), speed * np.gradient(heading, STEP)
-    pitch = _slope(way, height) + PITCH_PER_ACCELERATION * along
-    knots = np.arange(0.0, way[-1] + 2.0 * CAMBER_LENGTH, CAMBER_LENGTH)
-    camber = np.interp(way, knots, rng.normal(0.0, CAMBER_STD, knots.size))
-    return camber - ROLL_PER_ACCELERATION * across, pitch
+    pitch = _slope(way, height, ride.slope_smoothing) + ride.pitch_per_acceleration * along
+    knots = np.arange(0.0, way[-1] + 2.0 * ride.camber_length, ride.camber_length)
+    camber = np.interp(way, knots, rng.normal(0.0, ride.camber_std, knots.size))
+    return camber - ride.roll_per_acceleration * across, pitch
 
 
-def _slope(way: Array, height: Array) -> Array:
+def _slope(way: Array, height: Array, smoothing: float) -> Array:
     """Return the slope of the road, rad, from the height over the way, both shape (G,)."""
     from scipy.ndimage import gaussian_filter1d
 
     even = np.arange(0.0, way[-1] + 1.0)
     moves = np.append(True, np.diff(way) > 0.0)
-    profile = gaussian_filter1d(np.interp(even, way[moves], height[moves]), SLOPE_SMOOTHING, mode="nearest")
+    profile = gaussian_filter1d(np.interp(even, way[moves], height[moves]), smoothing, mode="nearest")
     slope = np.arctan(np.gradient(profile)) if even.size > 1 else np.zeros(1)
     return np.asarray(np.interp(way, even, slope))
 

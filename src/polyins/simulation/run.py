@@ -22,9 +22,9 @@ from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Road
 from polyins.simulation.ground import without_twist
 from polyins.simulation.imu_errors import TrueErrors, corrupt, draw_errors
-from polyins.simulation.increments import Increments, increments
+from polyins.simulation.increments import Increments, increments, stamps
 from polyins.simulation.moving_imu import FINE_STEPS, moving_increments, smooth_rates
-from polyins.simulation.path import Path, drive
+from polyins.simulation.path import Path
 from polyins.simulation.rolling import RollingWheel
 from polyins.simulation.shaking import shake, shaken_path
 from polyins.simulation.shared_noise import SharedNoise
@@ -36,9 +36,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-START_STD = (0.05, 0.05, np.array([1.0, 1.0, 0.1]) * DEG)
-"""m, m/s and rad (roll, pitch, heading): how sure a start that the truth gives claims to be"""
-
 
 @dataclass(frozen=True)
 class TrueRun:
@@ -47,8 +44,8 @@ class TrueRun:
     scenario: Scenario
     """its seeds and its duration are those of the path"""
     path: Path
-    body: Increments
-    """error-free, of the body"""
+    body: Increments | None
+    """error-free, of the body; None where the IMUs are on rulers"""
     wheels: tuple[RollingWheel, ...]
     """in the order of the scenario's"""
     spinning: tuple[Increments, ...]
@@ -56,11 +53,17 @@ class TrueRun:
     tips: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     """error-free (dtheta, dvel) of the IMUs on rulers, by name"""
 
+    @property
+    def time(self) -> Array:
+        """When the IMUs put out their increments, s, shape (T,)."""
+        return stamps(self.path, self.scenario.rate_hz)
+
     def sensed(self, imu: Imu) -> tuple[Array, Array]:
         """Return the error-free (dtheta, dvel) of an IMU in its own axes, shape (T, 3) each."""
         if imu.name in self.tips:
             return self.tips[imu.name]
         if imu.wheel is None:
+            assert self.body is not None
             return self.body.at(imu.position, imu.rotation)
         names = [wheel.name for wheel in self.scenario.wheels]
         return self.spinning[names.index(imu.module)].at(-imu.wheel.lever_arm)
@@ -96,7 +99,7 @@ def true_run(scenario: Scenario) -> TrueRun:
     run = TrueRun(
         fitted,
         path,
-        increments(path, scenario.rate_hz),
+        None if scenario.rulers else increments(path, scenario.rate_hz),
         wheels,
         tuple(wheel_increments(wheel, scenario.rate_hz) for wheel in wheels),
     )
@@ -105,13 +108,13 @@ def true_run(scenario: Scenario) -> TrueRun:
 
 def _on_rulers(run: TrueRun, rng: np.random.Generator) -> TrueRun:
     """Return a run whose body shakes on its road, and whose IMUs are at the tips of rulers."""
-    scenario, path, interval = run.scenario, run.path, run.body.interval
+    scenario, path, interval = run.scenario, run.path, 1.0 / run.scenario.rate_hz
     assert scenario.rulers is not None
     rulers = scenario.rulers.rulers(rng)
     road = scenario.road or Road()
     begins = scenario.shuttle.straights(path.duration, scenario.static_s)[1] if scenario.shuttle else ()
     shaking = shake(path, road.ground(path, begins, rng), road.suspension(), interval / FINE_STEPS)
-    smooth = smooth_rates(path, len(run.body.time), interval)
+    smooth = smooth_rates(path, len(run.time), interval)
     gravity = float(path.world.gravity(path.position(np.zeros(1)))[0])
     tips = {}
     for imu, ruler in zip(scenario.rig().imus, rulers, strict=True):
@@ -146,7 +149,7 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
         start=_start(scenario, run),
         options=FilterOptions(gravity=scenario.gravity_m_s2),
         name=scenario.name,
-        warnings=("outages: the drive is too short for one",) if too_short else (),
+        warnings=run.path.warnings + (("outages: the drive is too short for one",) if too_short else ()),
         config_text=write_yaml(scenario.model_dump(mode="json")),
     )
     return Simulation(recording, run.path, errors, lies, run.wheels)
@@ -169,14 +172,7 @@ def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
         return _shortened(scenario.replay.path(int(seed.generate_state(1)[0])), scenario)
     if scenario.shuttle:
         return scenario.shuttle.path(scenario.duration_s, scenario.static_s, start, world)
-    path = drive(
-        scenario.duration_s,
-        static=scenario.static_s,
-        seed=seed,
-        start=start,
-        top_speed=scenario.top_speed_m_s,
-        world=world,
-    )
+    path = scenario.drive.path(scenario.duration_s, scenario.static_s, seed, start, world)
     return without_twist(path) if scenario.wheels else path
 
 
@@ -202,7 +198,7 @@ def _sense(
     number: int, imu: Imu, run: TrueRun, shared: SharedNoise, rng: np.random.Generator
 ) -> tuple[Imu, ImuStream, TrueErrors]:
     """Return an IMU as it is configured, what it puts out, turned into array axes as a reader does, and its errors."""
-    scenario, time = run.scenario, run.body.time
+    scenario, time = run.scenario, run.time
     imperfections, grade = scenario.errors.imperfections(), noise_grade(scenario.noise)
     dtheta, dvel = run.sensed(imu)
     errors = draw_errors(time[-1], grade, imperfections, rng, shared=shared, number=number)
@@ -236,24 +232,24 @@ def _start(scenario: Scenario, run: TrueRun) -> StartOptions:
     """Return what is known of the start: when it stands, and with nothing but wheels to go by where and how.
 
     A robot that goes to and fro is too slow for its course to show the heading, so a reference gives it, as in paper A.
-    Paper B's lab starts from its reference, and from these standard deviations.
+    Paper B's lab starts from its reference.
     """
-    still = (float(run.body.time[0]), scenario.static_s)
+    still = (float(run.time[0]), scenario.static_s)
     interval = still if still[0] < still[1] else None
     truth = run.path.truth([scenario.static_s])
     if scenario.shuttle:
         return StartOptions(static_interval=interval, heading=float(truth.attitude[0, 2]), heading_from="value")
     if not scenario.wheels or scenario.gnss:
         return StartOptions(static_interval=interval)
-    position_std, velocity_std, attitude_std = START_STD
+    std = scenario.start_std
     return StartOptions(
         static_interval=interval,
         position=truth.position[0],
         heading=float(truth.attitude[0, 2]),
         heading_from="value",
-        position_std=np.full(3, position_std),
-        velocity_std=np.full(3, velocity_std),
-        attitude_std=attitude_std,
+        position_std=np.array(std.position_m),
+        velocity_std=np.array(std.velocity_m_s),
+        attitude_std=np.array(std.attitude_deg) * DEG,
     )
 
 

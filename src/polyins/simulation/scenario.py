@@ -32,11 +32,11 @@ from polyins.io.yaml_document import read_yaml
 from polyins.recording import FilterOptions, Recording
 from polyins.rig import DEG, Imu, Rig
 from polyins.simulation import earth
+from polyins.simulation.drive_scenario import Drive, Replay
 from polyins.simulation.error_scenario import Errors as Errors
 from polyins.simulation.flexible_scenario import Road, Rulers, Shuttle
-from polyins.simulation.path import START, TOP_SPEED, World
+from polyins.simulation.path import START, World
 from polyins.simulation.plane import Plane
-from polyins.simulation.replay_scenario import Replay
 from polyins.simulation.run import Simulation, checked, record, true_run
 from polyins.simulation.wheel_scenario import Laps, Track, WheelModule
 
@@ -106,6 +106,17 @@ class Fixes(Section):
     """wrong fixes"""
 
 
+class StartStd(Section):
+    """How sure a start that the truth gives claims to be, 1 sigma; paper B's lab starts like that."""
+
+    position_m: Spread = (0.05, 0.05, 0.05)
+    """north, east, down, m"""
+    velocity_m_s: Spread = (0.05, 0.05, 0.05)
+    """north, east, down, m/s"""
+    attitude_deg: Spread = (1.0, 1.0, 0.1)
+    """roll, pitch, heading, deg"""
+
+
 class Scenario(Section):
     """The whole file."""
 
@@ -125,8 +136,10 @@ class Scenario(Section):
     """on the plane only, m/s^2"""
     start: StartPosition | None = None
     """where the drive starts; without it in Wuhan, or at the plane's origin"""
-    top_speed_m_s: Positive = TOP_SPEED
-    """of the drive, m/s; a robot's is about 2"""
+    drive: Drive = Drive()
+    """how it is driven, and over which roads, where no track or laps or replay or shuttle is given"""
+    start_std: StartStd = StartStd()
+    """of the start that the truth gives where there are wheels and no receiver"""
     track: Track | None = None
     """a surveyed track instead of a drive"""
     laps: Laps | None = None
@@ -202,6 +215,16 @@ class Scenario(Section):
             raise blame("road", "is given without rulers; expected both or none")
         if self.road and self.road.books and not self.shuttle:
             raise blame("road.books", "lie on the straights of a shuttle; expected one")
+        return self
+
+    @model_validator(mode="after")
+    def _books_lie_on_the_straights(self) -> Self:
+        if self.road and self.shuttle:
+            longest = self.shuttle.straight_m
+            for book in self.road.books:
+                if book.at_m + book.length_m > longest:
+                    where = f"one at {book.at_m:g} m ends beyond the straight"
+                    raise blame("road.books", f"{where}; expected all within the {longest:g} m of straight_m")
         return self
 
     @model_validator(mode="after")

@@ -7,7 +7,6 @@ pitch, then roll. What the tyres do is in `tyres`.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,6 @@ from numpy.typing import NDArray
 from polyins.simulation.path import Motion, Path
 from polyins.simulation.road import Ground
 from polyins.simulation.tyres import Suspension, bounce
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicHermiteSpline
 
 Array = NDArray[np.float64]
 
@@ -33,12 +29,18 @@ class Shaking:
     change: Array
     """its derivative, shape (T, 3)"""
 
-    def curve(self) -> CubicHermiteSpline:
-        """Return the motion as a function of time."""
-        from scipy.interpolate import CubicHermiteSpline
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return motion and change, shape (N, 3) each, at times, s, shape (N,): cubics through the nearest two rows.
 
-        time = self.step * np.arange(len(self.motion))
-        return CubicHermiteSpline(time, self.motion, self.change, axis=0)
+        A spline through all rows would take longer than the few instants that are asked for.
+        """
+        row = np.clip((time / self.step).astype(int), 0, len(self.motion) - 2)
+        s = (time / self.step - row)[:, None]
+        before, after = self.step * self.change[row], self.step * self.change[row + 1]
+        rise = self.motion[row + 1] - self.motion[row]
+        square, cube = 3.0 * rise - 2.0 * before - after, before + after - 2.0 * rise
+        motion = self.motion[row] + s * (before + s * (square + s * cube))
+        return motion, (before + s * (2.0 * square + s * 3.0 * cube)) / self.step
 
 
 def shake(path: Path, ground: Ground, suspension: Suspension, step: float) -> Shaking:
@@ -64,15 +66,14 @@ def way(path: Path, time: Array) -> Array:
 class ShakenPath(Path):
     """A path whose body shakes: `motion` and `truth` are those of the body."""
 
-    shaking: CubicHermiteSpline | None = None
-    """heave, pitch, roll"""
+    shaking: Shaking | None = None
 
     def motion(self, time: Array) -> Motion:
         """Return position, velocity, attitude and rates of the array origin at times, shape (T,)."""
         smooth = super().motion(time)
         assert self.shaking is not None
-        heave, pitch, roll = self.shaking(time).T
-        rise, pitching, rolling = self.shaking(time, 1).T
+        motion, change = self.shaking.at(time)
+        (heave, pitch, roll), (rise, pitching, rolling) = motion.T, change.T
         none = np.zeros_like(heave)
         C_pb = rotation_matrices_of(roll, pitch)
         C_nb = smooth.C_nb @ C_pb
@@ -93,7 +94,7 @@ class ShakenPath(Path):
 
 def shaken_path(path: Path, shaking: Shaking) -> ShakenPath:
     """Return the path of the body of a robot that shakes about a smooth path."""
-    return ShakenPath(**{field.name: getattr(path, field.name) for field in fields(Path)}, shaking=shaking.curve())
+    return ShakenPath(**{field.name: getattr(path, field.name) for field in fields(Path)}, shaking=shaking)
 
 
 def rotation_matrices_of(roll: Array, pitch: Array) -> Array:

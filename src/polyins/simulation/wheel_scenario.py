@@ -14,7 +14,7 @@ from polyins.config.fields import blame
 from polyins.io.columns import column_names, read_columns
 from polyins.rig import DEG, Imu, NoiseGrade, Wheel
 from polyins.simulation import earth
-from polyins.simulation.laps import STARTING, lap_length, lap_points, lap_speeds
+from polyins.simulation.laps import lap_length, lap_points, lap_speeds
 from polyins.simulation.path import Path, World
 from polyins.simulation.rolling import RollingWheel, roll
 from polyins.simulation.slip import slip_periods
@@ -155,13 +155,17 @@ class Laps(Terrain):
     """mean, m/s"""
     change_m_s: NotNegative = 0.0
     """by which the speed goes up and down about its mean, m/s"""
+    change_every_s: Positive = 40.0
+    """from one time of greatest speed to the next, s"""
+    starting_s: Positive = 10.0
+    """until the speed is reached, and from when it falls to rest, s"""
 
     @model_validator(mode="after")
     def _can_be_driven(self) -> Self:
         if 2.0 * self.corner_m > min(self.length_m, self.width_m):
             raise blame("corner_m", f"is {self.corner_m:g}; expected at most half of length_m and of width_m")
-        if self._length < 2.0 * STARTING * self.speed_m_s:
-            raise blame("count", f"is {self.count}; expected laps of at least {2.0 * STARTING:g} s at speed_m_s")
+        if self._length < 2.0 * self.starting_s * self.speed_m_s:
+            raise blame("count", f"is {self.count}; expected laps of at least {2.0 * self.starting_s:g} s at speed_m_s")
         if self.change_m_s >= self.speed_m_s:
             raise blame("change_m_s", f"is {self.change_m_s:g}; expected less than the {self.speed_m_s:g} of speed_m_s")
         return self
@@ -169,7 +173,10 @@ class Laps(Terrain):
     def path(self, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path around; it begins and ends at rest."""
         points = lap_points(self.length_m, self.width_m, self.corner_m, self.count)
-        return self.over(points, lap_speeds(self._length, self.speed_m_s, self.change_m_s), static, start, world)
+        speeds = lap_speeds(
+            self._length, self.speed_m_s, change=self.change_m_s, every=self.change_every_s, starting=self.starting_s
+        )
+        return self.over(points, speeds, static, start, world)
 
     @property
     def _length(self) -> float:

@@ -1,0 +1,116 @@
+"""What a scenario may say of the drive of a road vehicle: one of its own, or a surveyed one to be driven again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from polyins.config import NotNegative, Number, Positive, PositiveSpread, Section
+from polyins.errors import InputError
+from polyins.io.checks import check_std, check_track
+from polyins.io.guess import read_stream
+from polyins.io.rows import Track
+from polyins.rig import DEG
+from polyins.simulation.path import Driving, Path, World, drive
+from polyins.simulation.replay import Ride, replay
+
+Array = NDArray[np.float64]
+
+Angle = Annotated[Number, Field(ge=0.0, le=10.0)]
+PerAcceleration = Annotated[Number, Field(ge=0.0, le=2.0)]
+
+RTK_STD_M = (0.02, 0.02, 0.04)
+
+
+class Drive(Section):
+    """A drive of its own: turns, slopes and stops that a seed draws."""
+
+    top_speed_m_s: Positive = 16.0
+    """m/s; a robot's is about 2"""
+    acceleration_m_s2: Positive = 2.0
+    """at most, along, m/s^2"""
+    lateral_acceleration_m_s2: Positive = 2.0
+    """at most, across, m/s^2"""
+    turn_radius_m: Positive = 10.0
+    """of the tightest turn, m"""
+    slope_deg: Angle = 1.5
+    """std of the road's slope, deg"""
+    steepest_deg: Angle = 4.0
+    """no slope is above this, deg"""
+    camber_deg: Angle = 0.7
+    """std of the road's slope across, deg; roads are built with 1 to 2"""
+    roll_deg_per_m_s2: PerAcceleration = 0.6
+    """by how much the body leans out of a turn, deg per m/s^2; passenger cars 0.3 to 0.7"""
+
+    def path(
+        self, duration: float, static: float, seed: np.random.SeedSequence, start: ArrayLike, world: World
+    ) -> Path:
+        """Return the path."""
+        driving = Driving(
+            top_speed=self.top_speed_m_s,
+            acceleration=self.acceleration_m_s2,
+            lateral_acceleration=self.lateral_acceleration_m_s2,
+            turn_radius=self.turn_radius_m,
+            slope_std=self.slope_deg * DEG,
+            steepest=self.steepest_deg * DEG,
+            camber_std=self.camber_deg * DEG,
+            roll_per_acceleration=self.roll_deg_per_m_s2 * DEG,
+        )
+        return drive(duration, static=static, seed=seed, start=start, driving=driving, world=world)
+
+
+class Replay(Section):
+    """Positions of a drive, as RTK gives them: speed, course and slope follow; the rest is said here."""
+
+    file: str
+    """positions of what becomes the array origin: a receiver's, or a table of time, latitude, longitude, height"""
+    from_s: Number | None = None
+    """stamp of the file from which on it is driven, s; without it the first"""
+    to_s: Number | None = None
+    """stamp until which it is driven, s; without it the last"""
+    position_std_m: PositiveSpread | None = None
+    """north, east, down, m: the path is smoothed as far as that allows; without it the file's, or 0.02, 0.02, 0.04"""
+    camber_deg: Angle = 0.7
+    """std of the road's slope across, which is drawn, deg; roads are built with 1 to 2"""
+    camber_length_m: Positive = 50.0
+    """from one camber to the next, m"""
+    slope_smoothing_m: NotNegative = 10.0
+    """the height is smoothed over this way before its slope is taken, 1 sigma, m"""
+    roll_deg_per_m_s2: PerAcceleration = 0.6
+    """by how much the body leans out of a turn, deg per m/s^2; passenger cars 0.3 to 0.7"""
+    pitch_deg_per_m_s2: PerAcceleration = 0.2
+    """by how much it squats and dives, deg per m/s^2; passenger cars 0.15 to 0.25"""
+    side_slip_deg_per_m_s2: PerAcceleration = 0.0
+    """by how much the nose points inwards of the course in a turn, deg per m/s^2; cars at speed have about 0.3"""
+
+    def path(self, seed: int) -> Path:
+        """Return the path along the positions, whose camber the seed draws; raises InputError for others."""
+        track, guesses = read_stream(self.file)
+        if not isinstance(track, Track) or not track.geodetic:
+            raise InputError(f"{track.source.path}: holds no latitudes and longitudes; expected those of a drive")
+        warnings = check_track(track, "a replay")
+        std = np.tile(self.position_std_m or RTK_STD_M, (len(track.time), 1))
+        if track.position_std is not None and self.position_std_m is None:
+            check_std(track.source, track.position_std)
+            std = track.position_std
+        begin, end = (-np.inf if self.from_s is None else self.from_s), (np.inf if self.to_s is None else self.to_s)
+        used = (track.time >= begin) & (track.time <= end)
+        if not used.any():
+            covered = f"{track.time[0]:g} to {track.time[-1]:g} s"
+            raise InputError(f"replay: no positions from {begin:g} to {end:g} s; {track.source.path} covers {covered}")
+        path = replay(track.time[used], track.position[used], std[used], ride=self._ride(), seed=seed)
+        return replace(path, warnings=(*guesses, *warnings))
+
+    def _ride(self) -> Ride:
+        return Ride(
+            camber_std=self.camber_deg * DEG,
+            camber_length=self.camber_length_m,
+            slope_smoothing=self.slope_smoothing_m,
+            roll_per_acceleration=self.roll_deg_per_m_s2 * DEG,
+            pitch_per_acceleration=self.pitch_deg_per_m_s2 * DEG,
+            side_slip=self.side_slip_deg_per_m_s2 * DEG,
+        )
