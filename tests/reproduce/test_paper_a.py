@@ -40,6 +40,15 @@ def test_the_scenario_has_the_real_outages() -> None:
     assert outages[-1] == (271130.0 + 90.0 * 28 - first, 271160.0 + 90.0 * 28 - first)
 
 
+def test_the_replayed_outages_are_at_the_real_ones_times(data_folder: Path) -> None:
+    assert data_folder
+    scenario = rigid_array.base_scenario(quick=False)
+    assert scenario.replay is not None
+    assert scenario.replay.from_s is not None
+    outages = true_run(scenario.model_copy(update={"rate_hz": 1.0})).scenario.outage_intervals()
+    assert [begin + scenario.replay.from_s for begin, _ in outages] == [271130.0 + 90.0 * k for k in range(29)]
+
+
 def test_a_calibration_takes_off_what_the_simulation_put_on() -> None:
     rng = np.random.default_rng(5)
     entry = chips.draw_chips(1, rng)

@@ -6,6 +6,7 @@ import pytest
 from polyins.errors import InputError
 from polyins.reproduce import nonrigid
 from polyins.simulation import flexible_scenario
+from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.error_scenario import Errors
 from polyins.simulation.road import ground
 from polyins.simulation.run import record, true_run
@@ -124,7 +125,7 @@ def test_the_reference_shakes_with_the_body():
         (
             "shuttle: {straight_m: 10}\nrulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\n"
             "road: {books: [{at_m: 9.9, height_m: 0.01}]}",
-            "road.books: one at 9.9 m ends beyond the straight; expected all within the 10 m",
+            "road.books: reach to 10.1 m; expected all within the 10 m",
         ),
         (
             "rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\nroad: {wavelengths_m: [3, 1]}",
@@ -133,6 +134,11 @@ def test_the_reference_shakes_with_the_body():
         (
             "rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\nroad: {books_shuffled: true}",
             "road.books_shuffled: is true without books; expected some",
+        ),
+        (
+            "rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\nshuttle: {}\n"
+            "road: {books: [{at_m: 1.1, height_m: 0.01, under: left}, {at_m: 1, height_m: 0.01}]}",
+            "road.books: one begins at 1.1 m, where another lies until 1.2 m; expected gaps",
         ),
         ("errors: {g_sensitivity: 1}", "did you mean g_sensitivity_deg_s_g"),
     ],
@@ -149,3 +155,8 @@ def test_without_a_road_the_rulers_hang_still(tmp_path):
     file.write_text("duration_s: 20\nstatic_s: 15\nrulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}")
     force = true_run(read_scenario(file)).tips["imu1"][1][:2000] / 0.005
     np.testing.assert_allclose(force, force[:1].repeat(2000, axis=0), atol=1e-9)
+
+
+def test_a_drive_beside_another_way_is_said_to_have_no_effect():
+    (warning,) = simulate(SHORT.model_copy(update={"drive": Drive(top_speed_m_s=3.0)})).warnings
+    assert warning == "drive: has no effect beside shuttle"

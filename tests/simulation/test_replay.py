@@ -190,10 +190,6 @@ def test_a_scenario_refuses_what_cannot_be_driven_again(tmp_path: FilePath, fixe
     }.items():
         with pytest.raises(InputError, match=message):
             read_scenario(replay_file(tmp_path, fixes, text))
-    part = read_scenario(replay_file(tmp_path, fixes)).replay
-    assert part is not None
-    with pytest.raises(InputError, match=r"no positions from 10 to 20 s; .*rtk\.csv covers 1000 to 1240 s"):
-        part.model_copy(update={"from_s": 10.0, "to_s": 20.0}).path(0)
     scenario = replay_file(tmp_path, fixes)
     lines = (tmp_path / "rtk.csv").read_text().splitlines()
     (tmp_path / "rtk.csv").write_text("\n".join([*lines[:5], "1004,,114.0,35.0", *lines[6:]]))
@@ -301,3 +297,25 @@ def test_doubts_about_a_survey_reach_the_recording(tmp_path: FilePath, fixes: tu
     (warning,) = simulate(tmp_path / "scenario.yaml").warnings
     assert "rtk.pos" in warning
     assert "float" in warning
+
+
+def test_a_part_that_is_not_there(tmp_path: FilePath, fixes: tuple[Array, Array, Array]) -> None:
+    file = str(replay_file(tmp_path, fixes).with_name("rtk.csv"))
+    with pytest.raises(InputError, match=r"from_s and to_s leave no positions; .*rtk\.csv covers 1000 to 1240 s"):
+        Replay(file=file, from_s=10.0, to_s=20.0).path(0)
+    (warning,) = Replay(file=file, from_s=10.0).path(0).warnings
+    assert "outside of what there is" in warning
+    assert Replay(file=file, from_s=1000.0, to_s=1240.0).path(0).warnings == ()
+    (tmp_path / "scenario.yaml").write_text("replay: {file: rtk.csv, from_s: 9, to_s: 5}")
+    with pytest.raises(InputError, match=r"line 1: replay\.to_s: is 5; expected more than the 9 of from_s"):
+        read_scenario(tmp_path / "scenario.yaml")
+    # what is wrong elsewhere in the file does not matter
+    lines = (tmp_path / "rtk.csv").read_text().splitlines()
+    (tmp_path / "rtk.csv").write_text("\n".join([*lines[:5], "1004,,114.0,35.0", *lines[6:]]))
+    assert Replay(file=file, from_s=1010.0).path(0).duration == pytest.approx(230.0)
+
+
+def test_heights_may_be_taken_as_they_are(tmp_path: FilePath, fixes: tuple[Array, Array, Array]) -> None:
+    file = str(replay_file(tmp_path, fixes).with_name("rtk.csv"))
+    rough, smooth = (Replay(file=file, slope_smoothing_m=way).path(0).pitch(np.arange(35.0, 239.0)) for way in (0, 10))
+    assert np.std(np.diff(rough)) > np.std(np.diff(smooth))

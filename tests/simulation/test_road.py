@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import welch
 
 from polyins.simulation.road import FINE, STEP, Bump, Roughness, Wheel, ground
-from polyins.simulation.shuttle import shuttle_path, straights
+from polyins.simulation.shuttle import Way, shuttle_path
 from polyins.simulation.transmission import transmit
 
 POINT, WHEEL = Wheel(0.0, 0.0), Wheel(0.125, 0.08)
@@ -78,8 +78,9 @@ def test_a_spring_passes_slow_motion_and_stops_fast_motion():
 
 
 def test_a_shuttle_returns_on_parallel_straights():
-    path = shuttle_path(120.0, 1.2, 12.0, 1.5, static=5.0)
-    begins, ways = straights(120.0, 1.2, 12.0, 1.5, 5.0)
+    there = Way(1.2, 12.0, 1.5)
+    path = shuttle_path(120.0, there, static=5.0)
+    begins, ways = there.straights(120.0, 5.0)
     heading = path.heading(begins)
     np.testing.assert_allclose(heading, np.pi * np.arange(begins.size), atol=1e-9)
     np.testing.assert_allclose(path.speed(np.linspace(8.0, 119.0, 50)), 1.2)

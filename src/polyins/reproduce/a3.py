@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from polyins.config import Positive, Section
 from polyins.recording import Recording
 from polyins.reproduce import rigid_array
 from polyins.reproduce.chips import Chips, parts_of
@@ -59,11 +60,17 @@ CANDIDATES = tuple(SOURCES)[:4]
 """Those whose size is an estimate: each in turn at the upper end of what is plausible, `upper.yaml`."""
 UNAWARE = "filter told 250 mGal of offset"
 STATED = "fixes as noisy as they state"
-LATE_S = 4.0
-LATE = f"standstill taken {LATE_S:g} s too long"
-"""The first biases and velocity are then wrong alike for all IMUs."""
 
 Document = dict[str, Any]
+
+
+class Upper(Section):
+    """What `upper.yaml` says."""
+
+    errors: Errors
+    """those that are estimates"""
+    standstill_late_s: Positive
+    """by how much the standstill is taken too long, s"""
 
 
 def reproduce(
@@ -175,7 +182,8 @@ def try_candidates(
     run: TrueRun, errors: Errors, chips: Chips, seeds: Sequence[int], steps: Steps
 ) -> dict[str, dict[str, float]]:
     """Return the same with one source larger, with a filter told too little, and with a start a little wrong."""
-    own, upper = with_chips(run, errors, chips), read(Errors, "upper").model_dump()
+    own, said = with_chips(run, errors, chips), read(Upper, "upper")
+    upper = said.errors.model_dump()
     makers: dict[str, Callable[[int], Recording]] = {
         name: partial(rigid_array.recording_of, _changed(own, {key: upper[key] for key in SOURCES[name]}))
         for name in CANDIDATES
@@ -186,7 +194,9 @@ def try_candidates(
     assert run.scenario.gnss is not None
     as_stated = _with_fixes(own, position_std_m=run.scenario.gnss.stated_std_m)
     makers[STATED] = partial(rigid_array.recording_of, as_stated)
-    makers[LATE] = lambda seed: _late(plain(seed), run.path.static)
+    late = said.standstill_late_s
+    # the first biases and velocity are then wrong alike for all IMUs
+    makers[f"standstill taken {late:g} s too long"] = lambda seed: _late(plain(seed), run.path.static + late)
     return {name: _pooled(make, seeds, steps) for name, make in makers.items()}
 
 
@@ -218,9 +228,9 @@ def _with_fixes(run: TrueRun, **keys: Any) -> TrueRun:
     return replace(run, scenario=run.scenario.model_copy(update={"gnss": receiver}))
 
 
-def _late(recording: Recording, static: float) -> Recording:
+def _late(recording: Recording, until: float) -> Recording:
     """Return the recording with the first seconds of motion taken for standstill."""
-    interval = (float(recording.imus[0].time[0]), static + LATE_S)
+    interval = (float(recording.imus[0].time[0]), until)
     return replace(recording, start=replace(recording.start, static_interval=interval))
 
 
@@ -255,7 +265,7 @@ def size_for(figure: float, sources: Mapping[str, Mapping[str, float]], at_most:
     """
     names = list(sources)
     without = sources[names[names.index("g-sensitivity") - 1]]["single"] ** 2
-    largest = read(Errors, "upper").g_sensitivity_deg_s_g
+    largest = read(Upper, "upper").errors.g_sensitivity_deg_s_g
     return float(largest * np.sqrt(max(figure**2 - without, 0.0) / (at_most**2 - without)))
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from polyins.config import NotNegative, Number, Positive, PositiveSpread, Section
+from polyins.config.fields import blame
 from polyins.errors import InputError
 from polyins.io.checks import check_std, check_track
 from polyins.io.guess import read_stream
@@ -21,19 +22,20 @@ from polyins.simulation.replay import Ride, replay
 Array = NDArray[np.float64]
 
 Angle = Annotated[Number, Field(ge=0.0, le=10.0)]
+Brisk = Annotated[Number, Field(ge=0.1, le=20.0)]
 PerAcceleration = Annotated[Number, Field(ge=0.0, le=2.0)]
 
 RTK_STD_M = (0.02, 0.02, 0.04)
 
 
 class Drive(Section):
-    """A drive of its own: turns, slopes and stops that a seed draws."""
+    """A drive of its own, which a seed draws: every 4 to 9 s another speed and mostly a turn, at times a stop."""
 
     top_speed_m_s: Positive = 16.0
     """m/s; a robot's is about 2"""
-    acceleration_m_s2: Positive = 2.0
+    acceleration_m_s2: Brisk = 2.0
     """at most, along, m/s^2"""
-    lateral_acceleration_m_s2: Positive = 2.0
+    lateral_acceleration_m_s2: Brisk = 2.0
     """at most, across, m/s^2"""
     turn_radius_m: Positive = 10.0
     """of the tightest turn, m"""
@@ -76,7 +78,7 @@ class Replay(Section):
     """north, east, down, m: the path is smoothed as far as that allows; without it the file's, or 0.02, 0.02, 0.04"""
     camber_deg: Angle = 0.7
     """std of the road's slope across, which is drawn, deg; roads are built with 1 to 2"""
-    camber_length_m: Positive = 50.0
+    camber_length_m: Annotated[Number, Field(ge=1.0)] = 50.0
     """from one camber to the next, m"""
     slope_smoothing_m: NotNegative = 10.0
     """the height is smoothed over this way before its slope is taken, 1 sigma, m"""
@@ -87,23 +89,40 @@ class Replay(Section):
     side_slip_deg_per_m_s2: PerAcceleration = 0.0
     """by how much the nose points inwards of the course in a turn, deg per m/s^2; cars at speed have about 0.3"""
 
+    @model_validator(mode="after")
+    def _begins_before_it_ends(self) -> Self:
+        if self.from_s is not None and self.to_s is not None and self.from_s >= self.to_s:
+            raise blame("to_s", f"is {self.to_s:g}; expected more than the {self.from_s:g} of from_s")
+        return self
+
     def path(self, seed: int) -> Path:
         """Return the path along the positions, whose camber the seed draws; raises InputError for others."""
         track, guesses = read_stream(self.file)
         if not isinstance(track, Track) or not track.geodetic:
             raise InputError(f"{track.source.path}: holds no latitudes and longitudes; expected those of a drive")
+        track, outside = self._part(track)
         warnings = check_track(track, "a replay")
         std = np.tile(self.position_std_m or RTK_STD_M, (len(track.time), 1))
         if track.position_std is not None and self.position_std_m is None:
             check_std(track.source, track.position_std)
             std = track.position_std
+        path = replay(track.time, track.position, std, ride=self._ride(), seed=seed)
+        return replace(path, warnings=(*guesses, *outside, *warnings))
+
+    def _part(self, track: Track) -> tuple[Track, tuple[str, ...]]:
+        """Return what is to be driven of the positions, and a warning if that is less than is asked for."""
+        if self.from_s is None and self.to_s is None:
+            return track, ()
         begin, end = (-np.inf if self.from_s is None else self.from_s), (np.inf if self.to_s is None else self.to_s)
-        used = (track.time >= begin) & (track.time <= end)
-        if not used.any():
-            covered = f"{track.time[0]:g} to {track.time[-1]:g} s"
-            raise InputError(f"replay: no positions from {begin:g} to {end:g} s; {track.source.path} covers {covered}")
-        path = replay(track.time[used], track.position[used], std[used], ride=self._ride(), seed=seed)
-        return replace(path, warnings=(*guesses, *warnings))
+        first, last = np.nanmin(track.time), np.nanmax(track.time)
+        covers = f"{track.source.path} covers {first:g} to {last:g} s"
+        if begin > last or end < first:
+            raise InputError(f"replay: from_s and to_s leave no positions; {covers}")
+        # stamps that are no numbers stay, to be named
+        used = np.flatnonzero(~((track.time < begin) | (track.time > end)))
+        early, late = np.isfinite(begin) and begin < first, np.isfinite(end) and end > last
+        warning = f"replay: from_s or to_s is outside of what there is; {covers}"
+        return track.at_rows(used), (warning,) if early or late else ()
 
     def _ride(self) -> Ride:
         return Ride(

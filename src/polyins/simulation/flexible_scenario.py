@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -17,7 +18,7 @@ from polyins.simulation.flexible import Ruler
 from polyins.simulation.path import Path, World
 from polyins.simulation.road import Bump, Ground, Roughness, Wheel, ground
 from polyins.simulation.shaking import way
-from polyins.simulation.shuttle import shuttle_path, straights
+from polyins.simulation.shuttle import Way, shuttle_path
 from polyins.simulation.tyres import Suspension
 
 Array = NDArray[np.float64]
@@ -32,25 +33,24 @@ class Shuttle(Section):
     """length of each straight, m"""
     turn_radius_m: Positive = 1.5
     """of the half turns between them, m"""
+    speed_up_s: Positive = 3.0
+    """from rest to the speed, s"""
+    steer_s: Positive = 1.0
+    """from straight ahead to the full turn, and back, s"""
     heading_deg: Number = 0.0
     """of the first straight, deg"""
 
     def path(self, duration: float, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path."""
-        return shuttle_path(
-            duration,
-            self.speed_m_s,
-            self.straight_m,
-            self.turn_radius_m,
-            static=static,
-            start=start,
-            heading=self.heading_deg * DEG,
-            world=world,
-        )
+        heading = self.heading_deg * DEG
+        return shuttle_path(duration, self._way(), static=static, start=start, heading=heading, world=world)
 
     def straights(self, duration: float, static: float) -> tuple[Array, Array]:
         """Return when the straights begin, s, and after which way, m."""
-        return straights(duration, self.speed_m_s, self.straight_m, self.turn_radius_m, static)
+        return self._way().straights(duration, static)
+
+    def _way(self) -> Way:
+        return Way(self.speed_m_s, self.straight_m, self.turn_radius_m, self.speed_up_s, self.steer_s)
 
 
 class Arm(Section):
@@ -78,6 +78,8 @@ class Rulers(Section):
     """of the rulers, m"""
     young_gpa: Positive = 200.0
     """Young's modulus, GPa; steel"""
+    shear_gpa: Positive = 79.0
+    """shear modulus, GPa; steel"""
     density_kg_m3: Positive = 7850.0
     """kg/m^3; steel"""
     tip_mass_kg: Positive = 0.015
@@ -122,6 +124,7 @@ class Rulers(Section):
             self.module_height_m,
             self.module_width_m,
             young=self.young_gpa * 1e9,
+            shear=self.shear_gpa * 1e9,
             density=self.density_kg_m3,
         )
 
@@ -188,6 +191,26 @@ class Road(Section):
         if self.books_shuffled and not self.books:
             raise blame("books_shuffled", "is true without books; expected some")
         return self
+
+    @model_validator(mode="after")
+    def _books_lie_side_by_side(self) -> Self:
+        for side in ("left", "right"):
+            spans = [
+                (book.at_m, end)
+                for book, end in zip(self.books, self.book_ends(), strict=True)
+                if self.books_shuffled or book.under in (side, "both")
+            ]
+            for (_, end), (begin, _) in pairwise(sorted(spans)):
+                if begin < end:
+                    raise blame(
+                        "books", f"one begins at {begin:g} m, where another lies until {end:g} m; expected gaps"
+                    )
+        return self
+
+    def book_ends(self) -> tuple[float, ...]:
+        """Return how far each book may reach along the straight, m: any may lie anywhere where they are shuffled."""
+        longest = max((book.length_m for book in self.books), default=0.0)
+        return tuple(book.at_m + (longest if self.books_shuffled else book.length_m) for book in self.books)
 
     def suspension(self) -> Suspension:
         """Return the robot's body on its wheels."""

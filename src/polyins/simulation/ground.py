@@ -14,13 +14,15 @@ from polyins.simulation.path import Path, path
 
 Array = NDArray[np.float64]
 
-SLOPE_LENGTH = 20.0  # m: the way over which the slope adapts to the one that the path had
 SLOPE_STEP = 0.1  # s
 ROLL_STEP = 0.01  # s
 
 
-def without_twist(twisting: Path) -> Path:
-    """Return the path of the same speed and heading over ground that does not twist and has similar slopes."""
+def without_twist(twisting: Path, adapts: float = 20.0) -> Path:
+    """Return the path of the same speed and heading over ground that does not twist and has similar slopes.
+
+    The slope adapts to the one that the path had over a way of `adapts`, m.
+    """
     from scipy.integrate import solve_ivp
     from scipy.interpolate import CubicSpline
 
@@ -31,7 +33,7 @@ def without_twist(twisting: Path) -> Path:
     def change(time: float, tilt: Array) -> list[float]:
         (pitch, roll), at = tilt, np.array([time])
         turn = float(twisting.heading(at, 1)[0])
-        towards = float(twisting.speed(at)[0] * (twisting.pitch(at)[0] - pitch)) / SLOPE_LENGTH
+        towards = float(twisting.speed(at)[0] * (twisting.pitch(at)[0] - pitch)) / adapts
         return [towards / np.cos(roll) - turn * np.tan(roll) * np.cos(pitch), turn * np.sin(pitch)]
 
     slopes = solve_ivp(change, (0.0, twisting.duration), tilt, t_eval=nodes, max_step=1.0, rtol=1e-6, atol=1e-9)

@@ -140,7 +140,9 @@ def _slope(way: Array, height: Array, smoothing: float) -> Array:
 
     even = np.arange(0.0, way[-1] + 1.0)
     moves = np.append(True, np.diff(way) > 0.0)
-    profile = gaussian_filter1d(np.interp(even, way[moves], height[moves]), smoothing, mode="nearest")
+    profile = np.interp(even, way[moves], height[moves])
+    if smoothing > 0.0:
+        profile = gaussian_filter1d(profile, smoothing, mode="nearest")
     slope = np.arctan(np.gradient(profile)) if even.size > 1 else np.zeros(1)
     return np.asarray(np.interp(way, even, slope))
 

@@ -137,7 +137,8 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
         for number, (imu, own_seed) in enumerate(zip(rig.imus, imu_seed.spawn(len(rig.imus)), strict=True))
     ]
     imus, streams, errors = zip(*sensed, strict=True)
-    too_short = bool(scenario.gnss and scenario.outages) and not scenario.outage_intervals()
+    lacks_outages = bool(scenario.gnss and scenario.outages) and not scenario.outage_intervals()
+    too_short = ("outages: the drive is too short for one",) if lacks_outages else ()
     fixes, lies = _receive(scenario, run.path, np.random.default_rng(gnss_seed))
     recording = Recording(
         rig=replace(rig, imus=imus),
@@ -149,7 +150,7 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
         start=_start(scenario, run),
         options=FilterOptions(gravity=scenario.gravity_m_s2),
         name=scenario.name,
-        warnings=run.path.warnings + (("outages: the drive is too short for one",) if too_short else ()),
+        warnings=(*run.path.warnings, *scenario.without_effect(), *too_short),
         config_text=write_yaml(scenario.model_dump(mode="json")),
     )
     return Simulation(recording, run.path, errors, lies, run.wheels)
@@ -167,7 +168,7 @@ def _path(scenario: Scenario, seed: np.random.SeedSequence) -> Path:
     if way := scenario.track or scenario.laps:
         path = way.path(scenario.static_s, start, world)
         uneven = scenario.wheels and way.slope_deg
-        return _shortened(without_twist(path) if uneven else path, scenario)
+        return _shortened(without_twist(path, way.slope_adapts_m) if uneven else path, scenario)
     if scenario.replay:
         return _shortened(scenario.replay.path(int(seed.generate_state(1)[0])), scenario)
     if scenario.shuttle:

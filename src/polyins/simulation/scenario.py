@@ -123,9 +123,9 @@ class Scenario(Section):
     name: str = "simulated drive"
     """of the recording"""
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
-    """another seed gives other errors, and another drive where no track or laps or replay is given"""
+    """another seed gives other errors, and another drive, camber of a replay, lawn and rulers, or slip, as there are"""
     path_seed: Annotated[int, Field(ge=0, strict=True)] | None = None
-    """of the drive and the wheels' slip, where they are to stay while seed draws other errors; without it seed"""
+    """of the drive, the ground and the wheels' slip, where they are to stay while seed draws other errors"""
     duration_s: Positive = 1000.0
     """the standing start included, s; a track, laps or a replay are driven to their end unless this is given"""
     static_s: NotNegative = 60.0
@@ -220,11 +220,9 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _books_lie_on_the_straights(self) -> Self:
         if self.road and self.shuttle:
-            longest = self.shuttle.straight_m
-            for book in self.road.books:
-                if book.at_m + book.length_m > longest:
-                    where = f"one at {book.at_m:g} m ends beyond the straight"
-                    raise blame("road.books", f"{where}; expected all within the {longest:g} m of straight_m")
+            end, straight = max(self.road.book_ends(), default=0.0), self.shuttle.straight_m
+            if end > straight:
+                raise blame("road.books", f"reach to {end:g} m; expected all within the {straight:g} m of straight_m")
         return self
 
     @model_validator(mode="after")
@@ -234,6 +232,19 @@ class Scenario(Section):
             if name in names[:index]:
                 raise blame("wheels", f"two modules are named {name!r}; expected a name of its own for each")
         return self
+
+    def without_effect(self) -> tuple[str, ...]:
+        """Return what is said for nothing, in words."""
+        way = next((name for name in ("track", "laps", "replay", "shuttle") if getattr(self, name)), "")
+        idle = {
+            f"drive: has no effect beside {way}": bool(way) and self.drive != Drive(),
+            "start_std: has an effect only with wheels and without gnss": self.start_std != StartStd()
+            and bool(self.gnss or not self.wheels),
+            "gnss.slow_time_s: has no effect without slow_std_m": self.gnss is not None
+            and self.gnss.slow_time_s != Fixes().slow_time_s
+            and not any(self.gnss.slow_std_m),
+        }
+        return tuple(words for words, is_so in idle.items() if is_so)
 
     @property
     def limited(self) -> bool:

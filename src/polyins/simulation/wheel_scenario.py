@@ -88,6 +88,8 @@ class Terrain(Section):
     """of ground in waves along the way, deg; with wheels it is bent until it does not twist, and rolls as well"""
     slope_length_m: Positive = 60.0
     """of a wave of the ground, m"""
+    slope_adapts_m: Annotated[Number, Field(ge=1.0)] = 20.0
+    """the way over which the ground, bent until it does not twist, comes back to these waves, m"""
 
     def over(
         self,
@@ -155,9 +157,9 @@ class Laps(Terrain):
     """mean, m/s"""
     change_m_s: NotNegative = 0.0
     """by which the speed goes up and down about its mean, m/s"""
-    change_every_s: Positive = 40.0
+    change_every_s: Annotated[Number, Field(ge=5.0)] = 40.0
     """from one time of greatest speed to the next, s"""
-    starting_s: Positive = 10.0
+    starting_s: Annotated[Number, Field(ge=1.0)] = 10.0
     """until the speed is reached, and from when it falls to rest, s"""
 
     @model_validator(mode="after")
