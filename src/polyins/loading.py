@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from polyins import datasets
-from polyins.config import Config, Rolling, parse
+from polyins.config import Config, parse
 from polyins.errors import InputError
 from polyins.io import checks, clocks, faults, kf_gins_configuration, wheel_checks, wheel_ins_configuration
 from polyins.io.imu_stream import as_mounted, read_imu
 from polyins.io.position_stream import read_gnss, read_reference
 from polyins.io.timing import outage_intervals, start_options
 from polyins.io.yaml_document import Document, read_yaml, write_yaml
-from polyins.recording import FilterOptions, ImuStream, Offset, Recording, RollingOptions
+from polyins.recording import FilterOptions, ImuStream, Offset, Recording
 from polyins.rig import Imu, Rig
 
 Settings = tuple[Config, Document, tuple[str, ...]]
@@ -222,20 +222,7 @@ def _filter_options(config: Config) -> FilterOptions:
         gate_reopen_after=config.filter.gate_reopen_after,
         gnss_snap=config.filter.gnss_snap_s,
         gravity=config.filter.gravity_m_s2,
-        rolling=_rolling_options(config.filter.rolling),
-    )
-
-
-def _rolling_options(rolling: Rolling) -> RollingOptions:
-    return RollingOptions(
-        speed_interval=rolling.speed_interval_s,
-        speed_window=rolling.speed_window_s,
-        predict=rolling.predict,
-        wheel_speed_std=np.array(rolling.wheel_speed_std_m_s),
-        body_speed_std=np.array(rolling.body_speed_std_m_s),
-        constraint_interval=rolling.constraint_interval_s,
-        constraint_std=rolling.constraint_std_m,
-        standstill=rolling.standstill,
+        rolling=config.filter.rolling.options(),
     )
 
 

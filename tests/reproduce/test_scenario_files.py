@@ -45,6 +45,8 @@ def says_all(scenario: Scenario, keys: set[str]) -> None:
         part = getattr(scenario, name)
         if name in scenario.model_fields_set and part is not None:
             assert said <= part.model_fields_set | ({"top_speed_m_s"} if name == "drive" else set()), name
+    if scenario.wheels:
+        assert set(type(scenario.rolling).model_fields) == scenario.rolling.model_fields_set
     for wheel in scenario.wheels:
         assert {"radius_m", "chips", "lever_arm_m"} <= wheel.model_fields_set
 

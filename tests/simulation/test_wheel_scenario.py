@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from polyins.config import Rolling
 from polyins.errors import InputError
 from polyins.loading import load
 from polyins.reproduce.vehicles import ROBOT
@@ -264,3 +265,10 @@ def test_the_robot_has_three_modules_of_four_chips(robot_data):
     still = recording.imus[4].time < 30.0
     bias = np.array([stream.dtheta[still].mean(axis=0) * 200.0 for stream in recording.imus])
     assert np.degrees(bias).std() * 3600.0 == pytest.approx(200.0, rel=0.4)
+
+
+def test_the_filter_is_told_how_wheels_aid_it():
+    recording = simulate(changed(rolling=Rolling(constraint_std_m=0.5, standstill=False)))
+    assert recording.options.rolling.constraint_std == 0.5
+    assert not recording.options.rolling.standstill
+    assert simulate(SHORT).options.rolling.standstill

@@ -7,7 +7,7 @@ experiments.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from polyins import batch
 from polyins.evaluation.errors import compare_to_reference
 from polyins.evaluation.summary import plain
-from polyins.recording import Recording, RollingOptions
+from polyins.recording import Recording
 from polyins.reproduce.progress import Steps
 from polyins.reproduce.robot import (
     CONFIGURATIONS,
@@ -165,7 +165,7 @@ def _settings(configurations: Configurations, experiments: dict[str, Experiment]
         {
             "runs": {name: len(labels) for name, labels in configurations.items()},
             "runs of the car and the experiments": {name: len(labels) for name, labels in FEW.items()},
-            "rolling": {**asdict(RollingOptions()), "standstill": False},
+            "rolling": ROBOT.base.rolling.model_dump(mode="json"),
             "experiments": {name: experiment.source for name, experiment in experiments.items()},
             "experiment_seeds": {name: experiment.seeds for name, experiment in experiments.items()},
         }

@@ -12,12 +12,13 @@ import numpy as np
 from polyins import batch
 from polyins.evaluation.drift import drift_rates
 from polyins.evaluation.errors import Errors, compare_to_reference, rms
-from polyins.recording import Recording, Reference, RollingOptions
+from polyins.recording import Recording, Reference
+from polyins.reproduce.vehicles import ROBOT
 from polyins.solution import Solution
 
 CHIPS = (1, 2, 3, 4)
 PAIRS = tuple(product(CHIPS, CHIPS))
-WINDOW = RollingOptions().speed_window
+WINDOW = ROBOT.base.rolling.speed_window_s
 """s"""
 WORKERS = 2
 """Threads: the filter's loop runs without Python's lock."""

@@ -148,7 +148,7 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
         geodetic=scenario.earth == "turning",
         outages=scenario.outage_intervals(),
         start=_start(scenario, run),
-        options=FilterOptions(gravity=scenario.gravity_m_s2),
+        options=FilterOptions(gravity=scenario.gravity_m_s2, rolling=scenario.rolling.options()),
         name=scenario.name,
         warnings=(*run.path.warnings, *scenario.without_effect(), *too_short),
         config_text=write_yaml(scenario.model_dump(mode="json")),

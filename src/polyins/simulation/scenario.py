@@ -19,6 +19,7 @@ from polyins.config import (
     OutageSchedule,
     Positive,
     PositiveSpread,
+    Rolling,
     Section,
     Spread,
     StartPosition,
@@ -164,6 +165,8 @@ class Scenario(Section):
     """how good the configuration says they are; without it as good as they are"""
     initial_std: InitialStd | None = None
     """how far off they may be at the start, as `initial_std` of a configuration; the rest is as noise and errors say"""
+    rolling: Rolling = Rolling()
+    """how wheels aid the filter, as the configuration has it under filter.rolling"""
     errors: Errors = Errors()
     """which errors they have"""
     gnss: Fixes | None = Fixes()
