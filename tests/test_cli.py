@@ -119,6 +119,7 @@ def test_simulate_writes_a_recording_that_runs(tmp_path: Path) -> None:
 def test_simulate_says_what_is_doubtful(tmp_path: Path) -> None:
     (tmp_path / "scenario.yaml").write_text(
         "duration_s: 30\nstatic_s: 10\nimus: {count: 1}\ngnss: {slow_time_s: 9}\nstart_std: {position_m: 1}\n"
+        "rolling: {standstill: false}\n"
     )
     made = polyins("simulate", "scenario.yaml", folder=tmp_path)
     assert made.returncode == 0
@@ -126,6 +127,7 @@ def test_simulate_says_what_is_doubtful(tmp_path: Path) -> None:
         "outages: the drive is too short for one",
         "gnss.slow_time_s: has no effect without slow_std_m",
         "start_std: has an effect only with wheels and without gnss",
+        "rolling: has no effect without wheels",
     ):
         assert f"warning: {words}" in made.stderr
 

@@ -93,6 +93,6 @@ def test_experiments_are_named_by_their_sizes() -> None:
 
 def test_what_a3_says_of_its_files_is_so() -> None:
     assert f"told {read(Scenario, 'a3').noise.accel_bias_mgal[0]:g} mGal" in a3.UNAWARE
-    upper = read(a3.Upper, "upper").errors
+    upper = a3.UPPER.errors
     assert upper.model_fields_set == {key for name in a3.CANDIDATES for key in a3.SOURCES[name]}
     assert f"to {upper.g_sensitivity_deg_s_g:g})" in a3.statement(*EXAMPLE)

@@ -117,6 +117,7 @@ def test_the_reference_shakes_with_the_body():
     [
         ("road: {roughness_mm: 1}", "road: is given without rulers; expected both or none"),
         ("rulers: {arms: []}", "rulers.arms: "),
+        ("shuttle: {steer_s: 9}", "shuttle.steer_s: is 9; expected at most the 3.9 s of a half turn"),
         ("rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0}]}", "free_length_m: is 0; expected"),
         (
             "rulers: {arms: [{tip_m: [0, 0.3, 0], free_length_m: 0.2}]}\nroad: {books: [{at_m: 1, height_m: 0.01}]}",

@@ -73,6 +73,9 @@ class Upper(Section):
     """by how much the standstill is taken too long, s"""
 
 
+UPPER = read(Upper, "upper")
+
+
 def reproduce(
     quick: bool = False, progress: Callable[[float], None] | None = None, out: Path | None = None
 ) -> Document:
@@ -182,8 +185,7 @@ def try_candidates(
     run: TrueRun, errors: Errors, chips: Chips, seeds: Sequence[int], steps: Steps
 ) -> dict[str, dict[str, float]]:
     """Return the same with one source larger, with a filter told too little, and with a start a little wrong."""
-    own, said = with_chips(run, errors, chips), read(Upper, "upper")
-    upper = said.errors.model_dump()
+    own, upper = with_chips(run, errors, chips), UPPER.errors.model_dump()
     makers: dict[str, Callable[[int], Recording]] = {
         name: partial(rigid_array.recording_of, _changed(own, {key: upper[key] for key in SOURCES[name]}))
         for name in CANDIDATES
@@ -194,7 +196,7 @@ def try_candidates(
     assert run.scenario.gnss is not None
     as_stated = _with_fixes(own, position_std_m=run.scenario.gnss.stated_std_m)
     makers[STATED] = partial(rigid_array.recording_of, as_stated)
-    late = said.standstill_late_s
+    late = UPPER.standstill_late_s
     # the first biases and velocity are then wrong alike for all IMUs
     makers[f"standstill taken {late:g} s too long"] = lambda seed: _late(plain(seed), run.path.static + late)
     return {name: _pooled(make, seeds, steps) for name, make in makers.items()}
@@ -265,7 +267,7 @@ def size_for(figure: float, sources: Mapping[str, Mapping[str, float]], at_most:
     """
     names = list(sources)
     without = sources[names[names.index("g-sensitivity") - 1]]["single"] ** 2
-    largest = read(Upper, "upper").errors.g_sensitivity_deg_s_g
+    largest = UPPER.errors.g_sensitivity_deg_s_g
     return float(largest * np.sqrt(max(figure**2 - without, 0.0) / (at_most**2 - without)))
 
 

@@ -40,6 +40,15 @@ class Shuttle(Section):
     heading_deg: Number = 0.0
     """of the first straight, deg"""
 
+    @model_validator(mode="after")
+    def _steers_within_the_turn(self) -> Self:
+        longest = np.pi * self.turn_radius_m / self.speed_m_s
+        if self.steer_s > longest:
+            raise blame(
+                "steer_s", f"is {self.steer_s:g}; expected at most the {longest:.2g} s of a half turn at speed_m_s"
+            )
+        return self
+
     def path(self, duration: float, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path."""
         heading = self.heading_deg * DEG

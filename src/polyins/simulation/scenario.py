@@ -243,6 +243,7 @@ class Scenario(Section):
             f"drive: has no effect beside {way}": bool(way) and self.drive != Drive(),
             "start_std: has an effect only with wheels and without gnss": self.start_std != StartStd()
             and bool(self.gnss or not self.wheels),
+            "rolling: has no effect without wheels": self.rolling != Rolling() and not self.wheels,
             "gnss.slow_time_s: has no effect without slow_std_m": self.gnss is not None
             and self.gnss.slow_time_s != Fixes().slow_time_s
             and not any(self.gnss.slow_std_m),
