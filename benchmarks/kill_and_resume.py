@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import polyins as pi
-from polyins import alignment, timesync
+from polyins.prepare import alignment, timesync
 from polyins.simulation.scenario import Board, Scenario
 
 POINTS, LATE_S = 1000, 0.2

@@ -26,13 +26,14 @@ from typing import Any
 
 from pyarrow import parquet
 
-from polyins import loading
-from polyins.io.yaml_document import read_yaml, write_yaml
+from polyins.config.yaml_document import read_yaml, write_yaml
 from polyins.live import lines
 from polyins.live.events import Epoch
 from polyins.live.replay import Replay
+from polyins.reading import loading
 from polyins.simulation import files
-from polyins.simulation.scenario import Board, Scenario, simulate
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Scenario
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "live"))
 from flooding import flood

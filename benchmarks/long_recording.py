@@ -23,8 +23,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from polyins.bench import machine
-from polyins.io.table import IMU_NAMES, LOCAL_NAMES, STD_NAMES
+from polyins.formats.table import IMU_NAMES, LOCAL_NAMES, STD_NAMES
+from polyins.tools.bench import machine
 
 RATE_HZ = 200.0
 SPEED, RADIUS, GRAVITY = 10.0, 300.0, 9.80665

@@ -23,11 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
-from polyins.bench import machine
-from polyins.io import kf_gins
-from polyins.io.yaml_document import read_yaml, write_yaml
+from polyins.config.yaml_document import read_yaml, write_yaml
+from polyins.formats import kf_gins
 from polyins.simulation import files
-from polyins.simulation.scenario import Board, Scenario, simulate
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Scenario
+from polyins.tools.bench import machine
 
 SECONDS = 1000.0
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.geodesy import metres_per_unit
-from polyins.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
-from polyins.rig import DEG, Imu, ImuErrors, NoiseGrade, Rig
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
+from polyins.model.rig import DEG, Imu, ImuErrors, NoiseGrade, Rig
 from polyins.simulation.increments import increments
 from polyins.simulation.path import START, Path, path
 

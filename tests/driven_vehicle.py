@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polyins.recording import Recording
+from polyins.model.recording import Recording
+from polyins.model.solution import Solution
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Fixes, Scenario
 from polyins.simulation.wheel_scenario import WheelModule
-from polyins.solution import Solution
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins import batch
-from polyins.navigator import Navigator, NavigatorState
-from polyins.recording import Recording
+from polyins.model.recording import Recording
+from polyins.navigate import batch
+from polyins.navigate.navigator import Navigator, NavigatorState
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.rig import NoiseGrade
+from polyins.model.rig import NoiseGrade
 
 Array = NDArray[np.float64]
 

@@ -47,8 +47,8 @@ from reference_filter import (
 )
 from scipy.spatial.transform import Rotation
 
-from polyins.recording import Recording, RollingOptions
-from polyins.rig import DEG, Imu
+from polyins.model.recording import Recording, RollingOptions
+from polyins.model.rig import DEG, Imu
 
 N = 24
 SPEED_ERROR = 21

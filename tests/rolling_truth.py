@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from reference_wheels import WheelState
 from scipy.spatial.transform import Rotation
 
-from polyins.recording import FilterOptions, ImuStream, Recording, RollingOptions
-from polyins.rig import Imu, NoiseGrade, Rig, Wheel
+from polyins.model.recording import FilterOptions, ImuStream, Recording, RollingOptions
+from polyins.model.rig import Imu, NoiseGrade, Rig, Wheel
 
 Array = NDArray[np.float64]
 

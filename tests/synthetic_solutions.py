@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polyins.attitude import quaternions, rotation_matrices
-from polyins.geodesy import metres_per_unit
-from polyins.recording import GnssStream, ImuStream, Recording, Reference
-from polyins.rig import Imu, NoiseGrade, Rig
-from polyins.solution import Innovations, Solution
+from polyins.model.attitude import quaternions, rotation_matrices
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.recording import GnssStream, ImuStream, Recording, Reference
+from polyins.model.rig import Imu, NoiseGrade, Rig
+from polyins.model.solution import Innovations, Solution
 
 START = np.array([np.radians(30.5), np.radians(114.35), 20.0])
 RADIUS_M = 80.0

@@ -11,16 +11,16 @@ from array_recordings import NOISE, Swing
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polyins import alignment
-from polyins.alignment import Start, find_standstill, find_start, level, rotation_matrix
 from polyins.errors import InputError
-from polyins.geodesy import metres_per_unit
 from polyins.kernels import earth
-from polyins.recording import GnssStream, ImuStream, Recording, Reference, StartOptions
-from polyins.rig import DEG, Imu, ImuErrors, Rig
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.recording import GnssStream, ImuStream, Recording, Reference, StartOptions
+from polyins.model.rig import DEG, Imu, ImuErrors, Rig
+from polyins.prepare import alignment
+from polyins.prepare.alignment import Start, find_standstill, find_start, level, rotation_matrix
+from polyins.prepare.timesync import align
 from polyins.simulation.increments import increments
 from polyins.simulation.path import START, Path, path, smooth_steps
-from polyins.timesync import align
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from polyins.attitude import (
+from polyins.model.attitude import (
     angular_rate,
     euler_angles,
     euler_jacobian,

@@ -9,12 +9,12 @@ import pytest
 from array_recordings import ATTITUDE_STD, POSITION_STD, VELOCITY_STD, shaken_path, shaken_recording
 from scipy.spatial.transform import Rotation
 
-from polyins import batch
 from polyins.errors import InputError
-from polyins.geodesy import metres_per_unit
-from polyins.methods import ARRAY_METHODS as METHODS
-from polyins.recording import FilterOptions, ImuStream, Recording
-from polyins.rig import DEG
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.methods import ARRAY_METHODS as METHODS
+from polyins.model.recording import FilterOptions, ImuStream, Recording
+from polyins.model.rig import DEG
+from polyins.navigate import batch
 
 
 @pytest.fixture(scope="module")

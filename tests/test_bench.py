@@ -2,7 +2,7 @@
 
 import pytest
 
-from polyins import bench
+from polyins.tools import bench
 
 
 def test_every_case_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from polyins.simulation import files
-from polyins.simulation.scenario import Board, Scenario, simulate
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Scenario
 
 
 def polyins(*arguments: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numba
 import pytest
 
-from polyins import batch, bench, compilation
-from polyins.screen import compilation_said
+from polyins.kernels.compilation import compilation_said, watched
+from polyins.navigate import batch
+from polyins.tools import bench
+from polyins.tools.warmup import warm_up
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -32,7 +34,7 @@ def test_without_compiling_nothing_is_said(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_nested_compilations_count_once() -> None:
-    with compilation.watched() as seconds:
+    with watched() as seconds:
         assert seconds() == 0.0
         inner = numba.njit(lambda x: x + 1)
         assert numba.njit(lambda x: inner(x))(1) == 2
@@ -40,10 +42,10 @@ def test_nested_compilations_count_once() -> None:
 
 
 def test_after_a_warm_up_nothing_is_left_to_compile() -> None:
-    families = compilation.warm_up()["families"]
+    families = warm_up()["families"]
     assert len(families) == len({family["name"] for family in families}) == 8
     array, vehicle = bench.array(2, 70.0), bench.vehicle(70.0)
-    with compilation.watched() as seconds:
+    with watched() as seconds:
         for method in ("single", "nav-fusion", "imu-fusion"):
             batch.prepare(array, method).advance(1, 20)
         for method in ("wheel-ins", "dual-wheel-ins"):

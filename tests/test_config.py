@@ -14,9 +14,9 @@ from pydantic import BaseModel
 
 from polyins import config
 from polyins.config import NOISE_GRADES, Config, ImuEntry, Noise, OutageSchedule, parse
+from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
-from polyins.io.yaml_document import Document, read_yaml, write_yaml
-from polyins.recording import FilterOptions
+from polyins.model.recording import FilterOptions
 
 
 def parsed(values: dict[str, Any]) -> Config:

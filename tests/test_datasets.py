@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from polyins import datasets
 from polyins.errors import InputError
+from polyins.reading import catalogue, datasets
 
 
 class Quiet(SimpleHTTPRequestHandler):
@@ -30,11 +30,11 @@ def public(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
     threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     registry = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in ("deep/a.csv", "b.csv")}
-    known = datasets.Dataset("two files", "none", "here", f"http://127.0.0.1:{server.server_port}/")
-    monkeypatch.setitem(datasets.DATASETS, "small", known)
-    monkeypatch.setattr(datasets, "_registry", lambda name: registry)
-    monkeypatch.setattr(datasets, "_cache_folder", lambda name: tmp_path / "cache" / name)
-    monkeypatch.setattr(datasets, "RETRIES", 0)
+    known = catalogue.Dataset("two files", "none", "here", f"http://127.0.0.1:{server.server_port}/")
+    monkeypatch.setitem(catalogue.DATASETS, "small", known)
+    monkeypatch.setattr(catalogue, "_registry", lambda name: registry)
+    monkeypatch.setattr(catalogue, "_cache_folder", lambda name: tmp_path / "cache" / name)
+    monkeypatch.setattr(catalogue, "RETRIES", 0)
     monkeypatch.delenv("POLYINS_DATA", raising=False)
     yield folder
     server.shutdown()
@@ -106,7 +106,7 @@ def test_a_recording_of_a_data_set_is_described(data_folder: Path) -> None:
 def test_checksums_are_those_of_the_files(data_folder: Path) -> None:
     import gzip
 
-    registry = datasets._registry("quadrotor")
+    registry = catalogue._registry("quadrotor")
     for path in ("Horizontal/path_9/IMU_1.csv", "Horizontal/path_27/GT.csv", "Vertical/path_8/IMU_4.csv"):
         content = gzip.decompress((data_folder / "quadrotor" / f"{path}.gz").read_bytes())
         assert registry[path] == f"sha256:{hashlib.sha256(content).hexdigest()}"

@@ -35,8 +35,8 @@ from pydantic_core import PydanticUndefined
 import polyins as pi
 from polyins import cli, config
 from polyins.config import columns
-from polyins.io.yaml_document import read_yaml
-from polyins.recording import GnssStream, ImuStream, Reference
+from polyins.config.yaml_document import read_yaml
+from polyins.model.recording import GnssStream, ImuStream, Reference
 from polyins.simulation import error_scenario, flexible_scenario, scenario
 from polyins.simulation.drive_scenario import Drive, Replay
 from polyins.simulation.wheel_scenario import Laps, Slip, Track, WheelModule
@@ -360,10 +360,10 @@ def test_every_command_and_option_is_listed(name: str) -> None:
 
 
 def test_every_target_and_method_is_listed() -> None:
-    from polyins.methods import METHODS
-    from polyins.reproduce.targets import TARGETS
+    from polyins.model.methods import METHODS
+    from polyins.studies.targets import known
 
-    assert all(f"`{target}`" in section("### polyins reproduce") for target in TARGETS)
+    assert all(f"`{target}`" in section("### polyins reproduce") for target in known())
     assert all(f"`{method}`" in section("### polyins run") for method in METHODS)
     readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     assert all(f"| `{method}` |" in readme for method in METHODS)
@@ -377,7 +377,7 @@ def test_every_public_name_is_listed() -> None:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a short run."""
-    from polyins import results
+    from polyins.tools import results
 
     folder = tmp_path_factory.mktemp("written")
     recording = pi.simulate(scenario.Scenario(duration_s=40, static_s=10, rate_hz=50, imus=scenario.Board(count=2)))

@@ -31,13 +31,13 @@ from array_recordings import on_a_plane as moved_to_a_plane
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polyins import batch, engine
-from polyins.geodesy import metres_per_unit
 from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
-from polyins.methods import ARRAY_METHODS as METHODS
-from polyins.recording import FilterOptions, GnssStream, Recording
-from polyins.rig import DEG, NoiseGrade, Rig
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.methods import ARRAY_METHODS as METHODS
+from polyins.model.recording import FilterOptions, GnssStream, Recording
+from polyins.model.rig import DEG, NoiseGrade, Rig
+from polyins.navigate import batch, engine
 
 Array = NDArray[np.float64]
 
@@ -255,7 +255,7 @@ def test_in_nav_fusion_each_imu_navigates_as_if_alone() -> None:
 def test_the_dense_covariance_gives_the_same_solution() -> None:
     recording = recorded(3, WUHAN, equal=False)
     structured, matrices = (
-        batch.run(recording, "enav-fusion", dense_covariance=dense) for dense in (False, True)
+        batch.navigate(batch.prepare(recording, "enav-fusion", dense_covariance=dense)) for dense in (False, True)
     )  # fmt: skip
     np.testing.assert_allclose(matrices.velocity, structured.velocity, atol=1e-7)
     np.testing.assert_allclose(matrices.position_variance, structured.position_variance, rtol=1e-8)
@@ -601,7 +601,7 @@ SCRIPT = """
 import sys
 import numpy as np
 from array_recordings import shaken_recording
-from polyins import batch
+from polyins.navigate import batch
 recording = shaken_recording(3, 2.04, fixes=np.array([0.1033, 0.2]), rate_hz=25.0)
 np.save(sys.argv[1], [batch.run(recording, method).position[-1] for method in ("enav-fusion", "imu-fusion")])
 """

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from polyins import batch
-from polyins.geodesy import metres_per_unit
-from polyins.recording import Recording
-from polyins.reproduce.array import SCENARIOS
-from polyins.simulation.scenario import Board, simulate
-from polyins.solution import Innovations
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.recording import Recording
+from polyins.model.solution import Innovations
+from polyins.navigate import batch
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board
+from polyins.studies.array import SCENARIOS
 
 CHIPS = SCENARIOS["chips"].model_copy(update={"duration_s": 400.0, "rate_hz": 100.0, "imus": Board(count=4)})
 """Outages of 30 s every 90 s; one fix per second."""

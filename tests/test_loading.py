@@ -23,11 +23,11 @@ from written_recordings import (
 )
 
 from polyins.config import parse
-from polyins.io.imu_stream import mount_rotation
-from polyins.io.position_stream import thinned
-from polyins.io.yaml_document import read_yaml
-from polyins.loading import load
-from polyins.rig import DEG, HOUR
+from polyins.config.yaml_document import read_yaml
+from polyins.model.rig import DEG, HOUR
+from polyins.reading.imu_stream import mount_rotation
+from polyins.reading.loading import load
+from polyins.reading.position_stream import thinned
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 

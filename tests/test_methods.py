@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from array_recordings import shaken_recording
 
-from polyins import batch
 from polyins.errors import InputError
-from polyins.methods import ARRAY_METHODS, METHODS, find_method
+from polyins.model.methods import ARRAY_METHODS, METHODS, find_method
+from polyins.navigate import batch
 
 
 def test_the_table_has_the_published_array_methods() -> None:

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from playing import Event, events, feed, navigator_for, play, row, rows
 
-from polyins import batch
 from polyins.errors import InputError
-from polyins.navigator import Navigator
-from polyins.recording import USUAL_OF, ImuStream, Recording
-from polyins.solution import Solution
+from polyins.model.recording import USUAL_OF, ImuStream, Recording
+from polyins.model.solution import Solution
+from polyins.navigate import batch
+from polyins.navigate.navigator import Navigator
 
 ARRAYS = ("single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization")
 WHEELS = ("wheel-ins", "body-ins", "triple-ins", "triple-ins/centralized")

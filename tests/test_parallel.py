@@ -9,11 +9,12 @@ import weakref
 import numpy as np
 import pytest
 
-from polyins.comparison import compare, compare_several
 from polyins.errors import InputError
 from polyins.evaluation.summary import rms
-from polyins.parallel import in_order, run_all
-from polyins.simulation.scenario import Board, Scenario, simulate
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Scenario
+from polyins.tools.comparison import compare, compare_several
+from polyins.tools.parallel import in_order, run_all
 
 
 def test_results_come_in_the_order_of_the_jobs_whichever_ends_first():

@@ -54,7 +54,7 @@ from reference_filter import (
 from scipy.integrate import fixed_quad
 from scipy.linalg import expm
 
-from polyins.rig import NoiseGrade
+from polyins.model.rig import NoiseGrade
 
 DEG = np.pi / 180.0
 NAMES = {"r": R, "v": V, "phi": PHI, "bg": BG, "ba": BA, "sg": SG, "sa": SA}

@@ -50,8 +50,8 @@ from reference_wheels import (
 from rolling_truth import MODULE, NOISE, ROBOT, RollingTruth, on_wheel, tilted
 from scipy.spatial.transform import Rotation
 
-from polyins.recording import FilterOptions, ImuStream, Recording, RollingOptions
-from polyins.rig import Imu, NoiseGrade, Rig
+from polyins.model.recording import FilterOptions, ImuStream, Recording, RollingOptions
+from polyins.model.rig import Imu, NoiseGrade, Rig
 
 POINT = np.mean([imu.position for imu in ROBOT if imu.wheel is not None], axis=0)
 ANTENNA = np.array([0.3, -0.1, -0.9])

@@ -18,12 +18,12 @@ from reference_wheels import N, WheelState, body_matrix, run_reference, with_err
 from rolling_truth import NOISE, RollingTruth, on_body, on_wheel, tilted
 from scipy.spatial.transform import Rotation
 
-from polyins import batch, engine
 from polyins.kernels import bank, share
 from polyins.kernels.bank import LANES
-from polyins.modules import ZERO_RATE_STD, ZERO_VELOCITY_STD
-from polyins.recording import GnssStream, Recording, RollingOptions, StartOptions
-from polyins.rig import Rig
+from polyins.model.recording import GnssStream, Recording, RollingOptions, StartOptions
+from polyins.model.rig import Rig
+from polyins.navigate import batch, engine
+from polyins.navigate.modules import ZERO_RATE_STD, ZERO_VELOCITY_STD
 
 ANTENNA = np.array([0.3, -0.1, -0.9])
 WUHAN = np.array([np.radians(30.5278), np.radians(114.3557), 35.0])

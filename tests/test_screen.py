@@ -4,7 +4,7 @@ import pytest
 from synthetic_solutions import drifting, drive, reference
 
 from polyins.evaluation.summary import comparison, summarize
-from polyins.screen import print_summaries
+from polyins.tools.summary_table import print_summaries
 
 TRUTH = drive(duration=60.0)
 

@@ -11,14 +11,15 @@ import pyarrow.parquet as pq
 import pytest
 
 import polyins as pi
-from polyins import streaming
 from polyins.errors import InputError
 from polyins.evaluation.summary import summarize
-from polyins.io.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
-from polyins.loading import read_config
-from polyins.recording import ImuStream, Recording
+from polyins.formats.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
+from polyins.model.recording import ImuStream, Recording
+from polyins.reading.loading import read_config
 from polyins.simulation import files
-from polyins.simulation.scenario import Board, OutageSchedule, Scenario, simulate
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, OutageSchedule, Scenario
+from polyins.tools import streaming
 
 TIMES = ("filter_s", "us_per_epoch", "first_call_s")
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
-from polyins.recording import ImuStream
-from polyins.timesync import align
+from polyins.model.recording import ImuStream
+from polyins.prepare.timesync import align
 
 Array = NDArray[np.float64]
 

@@ -9,13 +9,14 @@ import pytest
 from driven_vehicle import DEG, changed, drive, heading, off, with_rolling
 
 import polyins as pi
-from polyins import batch, course, modules
 from polyins.errors import InputError
 from polyins.kernels.bank import LANES
-from polyins.methods import find_method
-from polyins.recording import Recording
+from polyins.model.methods import find_method
+from polyins.model.recording import Recording
+from polyins.model.solution import Solution
+from polyins.navigate import batch, modules
+from polyins.prepare import course
 from polyins.simulation.scenario import Errors
-from polyins.solution import Solution
 
 
 @pytest.mark.parametrize("method", ["body-ins", "body-wheel-ins", "triple-ins", "multi-wheel-ins"])

@@ -23,7 +23,7 @@ from written_recordings import (
 )
 
 from polyins.errors import InputError
-from polyins.loading import load
+from polyins.reading.loading import load
 
 Values = dict[str, Any]
 Spoil = Callable[[Path, Values], None]

@@ -25,7 +25,7 @@ from rolling_files import (
 from written_recordings import write_config
 
 from polyins.errors import InputError
-from polyins.loading import load
+from polyins.reading.loading import load
 
 Spoil = Callable[[Path, Values], Any]
 
@@ -366,7 +366,7 @@ def test_the_recorded_way_is_the_way_rolled(tmp_path: Path) -> None:
 
 def test_a_real_car_is_not_suspected(data_folder: Path) -> None:
     """Of all checks of wheels only those say something that concern damaged rows."""
-    from polyins import datasets
+    from polyins.reading import datasets
 
     for trial in ("02", "08"):
         texts = [text for text in datasets.wid(trial, gnss=True).warnings if ".csv" not in text]
@@ -374,10 +374,10 @@ def test_a_real_car_is_not_suspected(data_folder: Path) -> None:
 
 
 def test_steered_wheels_of_a_real_car_are_found(data_folder: Path) -> None:
-    from polyins import datasets
-    from polyins.io.wid import configuration
-    from polyins.io.yaml_document import Document
-    from polyins.loading import load_document
+    from polyins.config.yaml_document import Document
+    from polyins.reading import datasets
+    from polyins.reading.loading import load_document
+    from polyins.reading.wid import configuration
 
     folder = datasets.fetch("wid")
     values = copy.deepcopy(configuration(folder, "09"))

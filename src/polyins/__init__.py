@@ -14,48 +14,56 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from polyins.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from polyins import datasets as datasets
-    from polyins.alignment import Start as Start
-    from polyins.batch import run as run
-    from polyins.comparison import compare as compare
     from polyins.errors import InputError as InputError
     from polyins.evaluation.summary import summarize as evaluate
-    from polyins.loading import load as load
-    from polyins.navigator import Navigator as Navigator
-    from polyins.recording import Recording as Recording
-    from polyins.rig import Imu as Imu
-    from polyins.rig import NoiseGrade as NoiseGrade
-    from polyins.rig import Rig as Rig
-    from polyins.simulation.scenario import simulate as simulate
-    from polyins.solution import Solution as Solution
+    from polyins.model.recording import GnssStream as GnssStream
+    from polyins.model.recording import ImuStream as ImuStream
+    from polyins.model.recording import Recording as Recording
+    from polyins.model.recording import StartOptions as StartOptions
+    from polyins.model.rig import Imu as Imu
+    from polyins.model.rig import NoiseGrade as NoiseGrade
+    from polyins.model.rig import Rig as Rig
+    from polyins.model.rig import Wheel as Wheel
+    from polyins.model.solution import Solution as Solution
+    from polyins.navigate.batch import run as run
+    from polyins.navigate.navigator import Navigator as Navigator
+    from polyins.prepare.alignment import Start as Start
+    from polyins.reading import datasets as datasets
+    from polyins.reading.loading import load as load
+    from polyins.simulation.run import simulate as simulate
+    from polyins.tools.comparison import compare as compare
 
 _HOMES = {
+    "GnssStream": "model.recording",
+    "Imu": "model.rig",
+    "ImuStream": "model.recording",
     "InputError": "errors",
-    "Imu": "rig",
-    "Navigator": "navigator",
-    "NoiseGrade": "rig",
-    "Recording": "recording",
-    "Rig": "rig",
-    "Solution": "solution",
-    "Start": "alignment",
-    "compare": "comparison",
-    "load": "loading",
-    "run": "batch",
-    "simulate": "simulation.scenario",
+    "Navigator": "navigate.navigator",
+    "NoiseGrade": "model.rig",
+    "Recording": "model.recording",
+    "Rig": "model.rig",
+    "Solution": "model.solution",
+    "Start": "prepare.alignment",
+    "StartOptions": "model.recording",
+    "Wheel": "model.rig",
+    "compare": "tools.comparison",
+    "datasets": "reading.datasets:",
+    "evaluate": "evaluation.summary:summarize",
+    "load": "reading.loading",
+    "run": "navigate.batch",
+    "simulate": "simulation.run",
 }
 
-__all__ = ["__version__", "datasets", "evaluate", *_HOMES]
+__all__ = ["__version__", "evaluate", *(name for name in _HOMES if name != "evaluate")]
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that the command line starts fast."""
-    if name == "datasets":
-        return importlib.import_module("polyins.datasets")
-    if name == "evaluate":
-        return importlib.import_module("polyins.evaluation.summary").summarize
-    if name in _HOMES:
-        return getattr(importlib.import_module(f"polyins.{_HOMES[name]}"), name)
-    raise AttributeError(f"module 'polyins' has no attribute {name!r}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'polyins' has no attribute {name!r}")
+    home, colon, attribute = _HOMES[name].partition(":")
+    module = importlib.import_module(f"polyins.{home}")
+    return module if colon and not attribute else getattr(module, attribute or name)

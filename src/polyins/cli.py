@@ -5,19 +5,22 @@ from __future__ import annotations
 import gc
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from polyins import __version__
 from polyins.errors import InputError
-from polyins.screen import compilation_said, number, print_summaries, print_table, progress, say
+from polyins.files import make_folder
+from polyins.kernels.compilation import compilation_said
+from polyins.screen import number, print_table, progress, say
+from polyins.tools.summary_table import print_summaries
+from polyins.version import __version__
 
 if TYPE_CHECKING:
-    from polyins.recording import Recording
+    from polyins.model.recording import Recording
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
@@ -80,11 +83,13 @@ def main() -> None:
 @out_option("polyins-demo")
 def demo(out: Path) -> None:
     """Simulate a drive with an array of 16 IMUs, run every array method, show table and report."""
-    from polyins.simulation import files, scenario
+    from polyins.simulation import files
+    from polyins.simulation.run import simulate as drive
+    from polyins.simulation.scenario import demo as scenario
 
     say("simulating a drive with 16 IMUs and GNSS ...")
     with progress("simulating"):
-        config = files.write(scenario.simulate(scenario.demo()), out / "recording")
+        config = files.write(drive(scenario()), out / "recording")
     say(f"recording: {config}")
     _compare(config, None, out, as_json=False, report=True)
 
@@ -102,9 +107,11 @@ def demo(out: Path) -> None:
 @no_report_option
 def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool) -> None:
     """Run one method over one recording (polyins YAML, or a KF-GINS or Wheel-INS configuration)."""
-    from polyins import batch, loading, results, streaming
     from polyins.evaluation.summary import summarize
-    from polyins.methods import find_method
+    from polyins.model.methods import find_method
+    from polyins.navigate import batch
+    from polyins.reading import loading
+    from polyins.tools import results, streaming
 
     gc.set_threshold(COLLECT_AFTER)
     if method is not None:
@@ -119,7 +126,7 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
         raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
     name = method or _usual_method(recording, imu)
     index = _imu_index([one.name for one in recording.rig.imus], imu)
-    results.make_folder(out)
+    make_folder(out)
     report = not no_report and long is None
     if long is not None:
         with compilation_said(), progress(name) as update:
@@ -132,7 +139,7 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
         with progress("writing"):
             results.write_run(out, recording, solution, summary, report=report)
     if as_json:
-        print(results.as_json(summary))
+        _print_json(summary)
         return
     print_summaries(recording.name, {name: summary}, {})
     say("start: " + ", ".join(f"{key} {value}" for key, value in summary["start"].items()))
@@ -141,8 +148,14 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
 
 
+def _print_json(document: Mapping[str, Any]) -> None:
+    from polyins.formats.documents import as_json
+
+    print(as_json(document))
+
+
 def _usual_method(recording: Recording, imu: str | None) -> str:
-    from polyins.modules import usual_method
+    from polyins.navigate.modules import usual_method
 
     return usual_method(recording.rig) if imu is None else "single"
 
@@ -166,7 +179,7 @@ def compare(
     configs: tuple[Path, ...], methods: str | None, threads: int | None, out: Path, as_json: bool, no_report: bool
 ) -> None:
     """Run several methods over one recording or more, and each IMU on its own."""
-    from polyins.methods import find_method
+    from polyins.model.methods import find_method
 
     gc.set_threshold(COLLECT_AFTER)
     names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else None
@@ -179,19 +192,19 @@ def compare(
 def _compare(
     config: Path, methods: list[str] | None, out: Path, as_json: bool, report: bool, threads: int | None = None
 ) -> None:
-    from polyins import results
-    from polyins.comparison import compare as run_all
-    from polyins.loading import load
+    from polyins.reading.loading import load
+    from polyins.tools import results
+    from polyins.tools.comparison import compare as run_all
 
     with progress("reading"):
         recording = load(config)
-    results.make_folder(out)
+    make_folder(out)
     with compilation_said(), progress("compare") as update:
         result = run_all(recording, methods, threads=threads, progress=update)
     with progress("writing"):
         results.write_comparison(out, recording, result, report=report)
     if as_json:
-        print(results.as_json(result.document))
+        _print_json(result.document)
         return
     _print_comparison(recording.name, result.document)
     say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
@@ -200,23 +213,24 @@ def _compare(
 def _compare_several(
     configs: tuple[Path, ...], methods: list[str] | None, out: Path, as_json: bool, report: bool, threads: int | None
 ) -> None:
-    from polyins import results
-    from polyins.comparison import Comparison, compare_several
-    from polyins.loading import load_settings, names_of, read_config
+    from polyins.formats.documents import write_document
+    from polyins.reading.loading import load_settings, names_of, read_config
+    from polyins.tools import results
+    from polyins.tools.comparison import Comparison, compare_several
 
     settings = [read_config(config) for config in configs]
     readers = {name: partial(load_settings, one) for name, one in zip(names_of(settings), settings, strict=True)}
-    results.make_folder(out)
+    make_folder(out)
 
     def write(name: str, recording: Recording, result: Comparison) -> None:
-        results.make_folder(out / name)
+        make_folder(out / name)
         results.write_comparison(out / name, recording, result, report=report)
 
     with compilation_said(), progress("compare") as update:
         document = compare_several(readers, write, methods, threads=threads, progress=update)
-    results.write_document(out / "summary.json", document)
+    write_document(out / "summary.json", document)
     if as_json:
-        print(results.as_json(document))
+        _print_json(document)
         return
     for name, part in document["recordings"].items():
         _print_comparison(name, part)
@@ -269,12 +283,11 @@ def live(config: Path, sources: tuple[str, ...], sinks: tuple[str, ...], speed: 
 @as_json_option
 def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
     """Estimate from a drive how wheel and body IMUs are mounted, and write a configuration that says it."""
-    from polyins import results
     from polyins.calibration import listing
     from polyins.calibration.configuration import calibrated
     from polyins.calibration.drive import calibrate as estimate
-    from polyins.io.files import write_bytes
-    from polyins.loading import build, read_config
+    from polyins.files import write_bytes
+    from polyins.reading.loading import build, read_config
 
     with progress("reading"):
         settings, document, warnings = read_config(config)
@@ -284,10 +297,10 @@ def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
     target = out or document.path.with_name(f"{document.path.stem}-calibrated.yaml")
     moved = target.resolve().parent != document.path.resolve().parent
     text = calibrated(document.values, settings, calibration, document.path.resolve().parent if moved else None)
-    results.make_folder(target.parent)
+    make_folder(target.parent)
     write_bytes(target, text.encode())
     if as_json:
-        print(results.as_json(listing.document(calibration)))
+        _print_json(listing.document(calibration))
         return
     print_table(recording.name, listing.COLUMNS, listing.rows(calibration))
     for warning in (*warnings, *recording.warnings, *calibration.warnings):
@@ -302,15 +315,14 @@ def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
 @as_json_option
 def evaluate(solution: Path, reference: Path, as_json: bool) -> None:
     """Compare a written solution with a reference."""
-    from polyins import results
     from polyins.evaluation.summary import summarize
-    from polyins.io.position_stream import load_reference
-    from polyins.io.solution_files import read_solution
+    from polyins.formats.solution_files import read_solution
+    from polyins.reading.reference import load_reference
 
     estimate = read_solution(solution)
     summary = summarize(estimate, load_reference(reference, estimate))
     if as_json:
-        print(results.as_json(summary))
+        _print_json(summary)
     else:
         print_summaries(str(solution), {estimate.method: summary}, {})
 
@@ -322,7 +334,7 @@ def evaluate(solution: Path, reference: Path, as_json: bool) -> None:
 def simulate(scenario: Path, out: Path, seed: int | None) -> None:
     """Simulate the recording that a scenario file describes, with its truth and a configuration to run it."""
     from polyins.simulation import files
-    from polyins.simulation.scenario import simulate as drive
+    from polyins.simulation.run import simulate as drive
 
     with progress("simulating"):
         recording = drive(scenario, seed=seed)
@@ -339,38 +351,39 @@ def simulate(scenario: Path, out: Path, seed: int | None) -> None:
 @as_json_option
 def reproduce(target: str, quick: bool, out: Path, as_json: bool) -> None:
     """Reproduce published or measured figures. TARGET: all, figures, or one, such as a3."""
-    from polyins import results
-    from polyins.reproduce import targets, together
+    from polyins.formats.documents import write_document
+    from polyins.studies import reproduction, targets
 
-    names = targets.SEVERAL.get(target, ())
-    function = None if names else targets.find_target(target, out)
-    results.make_folder(out)
+    found = targets.find(target)
+    several = target in targets.SEVERAL
+    make_folder(out)
     with compilation_said(), progress(target) as update:
-        document = function(quick, update) if function else together.reproduce(target, names, quick, out, update, say)
-    results.write_document(out / f"{target}.json", document)
+        if several:
+            document = reproduction.reproduce(target, found, quick, out, update, say)
+        else:
+            document = found[0].reproduce(quick, update, out)
+    write_document(out / f"{target}.json", document)
     if quick:
         say("the quick form: its figures are not those of the full one")
     if as_json:
-        print(results.as_json(document))
-    elif names:
-        for part in together.parts(document):
-            targets.print_document(part)
+        _print_json(document)
+        return
+    for part in reproduction.parts(document) if several else [document]:
+        reproduction.print_document(part)
+    if several:
         say(f"page: {out / 'index.html'}")
-    else:
-        targets.print_document(document)
 
 
 @cli.command()
 @as_json_option
 def warmup(as_json: bool) -> None:
     """Compile ahead of time what the methods need: in a container image, or before a robot sets off."""
-    from polyins import results
-    from polyins.compilation import warm_up
+    from polyins.tools.warmup import warm_up
 
     with progress("compiling") as update:
         document = warm_up(update)
     if as_json:
-        print(results.as_json(document))
+        _print_json(document)
         return
     rows = [[family["name"], number(family["compiled_s"], 1)] for family in document["families"]]
     print_table("kernels", ["for", "compiled, s"], rows)
@@ -384,8 +397,7 @@ def warmup(as_json: bool) -> None:
 @as_json_option
 def bench(all_cores: bool, as_json: bool) -> None:
     """Time every method per epoch against the dense, paper-shaped single filter, in one run."""
-    from polyins import results
-    from polyins.bench import bench as measure
+    from polyins.tools.bench import bench as measure
 
     if all_cores:
         _throughput(as_json)
@@ -393,7 +405,7 @@ def bench(all_cores: bool, as_json: bool) -> None:
     with compilation_said(), progress("bench") as update:
         document = measure(update)
     if as_json:
-        print(results.as_json(document))
+        _print_json(document)
         return
     columns = ["name", "us/epoch, median", "min", "ratio to dense/single", "runs"]
     rows = [
@@ -404,13 +416,12 @@ def bench(all_cores: bool, as_json: bool) -> None:
 
 
 def _throughput(as_json: bool) -> None:
-    from polyins import results
-    from polyins.throughput import throughput
+    from polyins.tools.throughput import throughput
 
     with compilation_said(), progress("bench") as update:
         document = throughput(update)
     if as_json:
-        print(results.as_json(document))
+        _print_json(document)
         return
     rates = zip(document["threads"], document["recordings_per_s"], strict=True)
     rows = [[str(threads), number(rate, 1)] for threads, rate in rates]
@@ -426,7 +437,7 @@ def datasets() -> None:
 @datasets.command("list")
 def list_datasets() -> None:
     """List the data sets that polyins knows."""
-    from polyins import datasets as known
+    from polyins.reading import datasets as known
 
     rows = [[name, str(known.info(name)["summary"]), str(known.info(name)["folder"] or "-")] for name in known.names()]
     print_table("data sets", ["name", "what", "folder"], rows)
@@ -436,7 +447,7 @@ def list_datasets() -> None:
 @click.argument("name")
 def dataset_info(name: str) -> None:
     """Say what a data set is and where it is."""
-    from polyins import datasets as known
+    from polyins.reading import datasets as known
 
     for key, value in known.info(name).items():
         click.echo(f"{key}: {value}")
@@ -446,7 +457,7 @@ def dataset_info(name: str) -> None:
 @click.argument("name")
 def fetch_dataset(name: str) -> None:
     """Download a data set, unless it is here, and print its folder."""
-    from polyins import datasets as known
+    from polyins.reading import datasets as known
 
     click.echo(known.fetch(name))
 
@@ -456,7 +467,7 @@ def fetch_dataset(name: str) -> None:
 @click.option("--gnss", is_flag=True, help="Let the receiver's positions aid the filter.")
 def dataset_configuration(name: str, gnss: bool) -> None:
     """Print the configuration of a recording of a data set, such as wid/trial08."""
-    from polyins import datasets as known
+    from polyins.reading import datasets as known
 
     click.echo(known.configuration(name, gnss=gnss), nl=False)
 
@@ -466,11 +477,13 @@ def dataset_configuration(name: str, gnss: bool) -> None:
 @as_json_option
 def info(file: Path, as_json: bool) -> None:
     """Say what is in a data file or configuration: streams, rates, gaps, span."""
-    from polyins import results
-    from polyins.io.inspect import inspect, listing
+    from polyins.tools.inspect import inspect, listing
 
     facts = inspect(file)
-    click.echo(results.as_json(facts) if as_json else listing(facts))
+    if as_json:
+        _print_json(facts)
+    else:
+        click.echo(listing(facts))
 
 
 @cli.command()
@@ -478,7 +491,7 @@ def info(file: Path, as_json: bool) -> None:
 @click.argument("target", metavar="OUT", type=FILE)
 def convert(source: Path, target: Path) -> None:
     """Convert a data file; the formats follow from content (IN) and suffix (OUT)."""
-    from polyins.io.convert import convert as convert_file
+    from polyins.tools.convert import convert as convert_file
 
     for text in convert_file(source, target):
         say(f"warning: {text}")
@@ -490,8 +503,8 @@ def convert(source: Path, target: Path) -> None:
 @click.option("--out", type=FILE, default=None, help="File for the configuration; standard output unless given.")
 def init(files: tuple[Path, ...], out: Path | None) -> None:
     """Look at recordings and write a commented configuration for them."""
-    from polyins.io.files import write_bytes
-    from polyins.io.propose import propose
+    from polyins.files import write_bytes
+    from polyins.tools.propose import propose
 
     if out is not None and out.parent.resolve() != Path.cwd():
         # names in a configuration count from its own folder

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from driven_vehicle import DEG, Array, drive
 
-from polyins import batch
 from polyins.aiding import measurement, rolling
-from polyins.batch import Prepared
 from polyins.kernels import bank, earth, fuse, kalman, share
 from polyins.kernels.bank import LANES
+from polyins.navigate import batch
+from polyins.navigate.batch import Prepared
 
 STEPS = {"position": (range(3), 1e-3), "velocity": (range(3, 6), 1e-4), "phi": (range(6, 9), 1e-5)}
 MOUNT = (range(share.INERTIAL, share.INERTIAL + 3), 1e-5)

@@ -10,9 +10,9 @@ from driven_vehicle import DEG, drive, heading, off, without
 from scipy.spatial.transform import Rotation
 
 import polyins as pi
-from polyins import batch
 from polyins.kernels import bank
 from polyins.kernels.bank import LANES
+from polyins.navigate import batch
 from polyins.simulation.scenario import Errors
 
 

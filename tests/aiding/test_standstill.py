@@ -9,8 +9,8 @@ import pytest
 from driven_vehicle import drive, with_rolling
 
 import polyins as pi
-from polyins import batch
 from polyins.aiding import rolling
+from polyins.navigate import batch
 from polyins.simulation.scenario import Errors
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polyins.recording import GnssStream, ImuStream, Recording
-from polyins.rig import Imu, NoiseGrade, Rig, Wheel
+from polyins.model.recording import GnssStream, ImuStream, Recording
+from polyins.model.rig import Imu, NoiseGrade, Rig, Wheel
 
 GRAVITY = 9.80665
 RATE_HZ = 100.0

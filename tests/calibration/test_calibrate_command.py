@@ -14,9 +14,9 @@ from polyins.calibration.configuration import calibrated
 from polyins.calibration.drive import Calibration, Estimate
 from polyins.cli import cli
 from polyins.config import parse
+from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
-from polyins.io.yaml_document import Document, read_yaml, write_yaml
-from polyins.loading import load
+from polyins.reading.loading import load
 
 RADIUS = 0.29
 PLACE = np.array([0.0, 0.006, -0.05])

@@ -17,8 +17,8 @@ from simulated_drive import (
 
 from polyins.calibration.offsets import gnss_offset, imu_offsets
 from polyins.errors import InputError
-from polyins.recording import ImuStream
-from polyins.rig import Imu
+from polyins.model.recording import ImuStream
+from polyins.model.rig import Imu
 
 PLACE = np.array([0.0, 0.004, -0.01])
 BIAS = np.radians([2.0, -1.0, 0.5])

@@ -15,7 +15,7 @@ from simulated_drive import (
 
 from polyins.calibration.drive import Calibration, Estimate, calibrate
 from polyins.errors import InputError
-from polyins.rig import Imu
+from polyins.model.rig import Imu
 
 RADIUS = 0.29
 PLACE = np.array([0.0, 0.006, -0.15])

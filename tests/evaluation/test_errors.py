@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_solutions import RADIUS_M, drive, moved, reference, solution
 
-from polyins.attitude import quaternions
 from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
+from polyins.model.attitude import quaternions
 
 metres = st.floats(-50.0, 50.0)
 

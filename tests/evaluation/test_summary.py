@@ -7,8 +7,9 @@ import pytest
 from synthetic_solutions import drifting, drive, innovations, moved, reference, solution
 
 import polyins
-from polyins.attitude import quaternions
-from polyins.evaluation.summary import comparison, plain, summarize
+from polyins.evaluation.summary import comparison, summarize
+from polyins.formats.documents import plain
+from polyins.model.attitude import quaternions
 
 KEYS = {
     "polyins", "method", "imus", "rate_hz", "duration_s", "epochs", "filter_s", "us_per_epoch", "first_call_s",

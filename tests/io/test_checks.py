@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from written_recordings import as_increments, still_imu
 
+from polyins.checks.stream_checks import check_imu, check_upright, upright_axes
 from polyins.errors import InputError
-from polyins.io.checks import axes_matrix, check_imu, check_upright, right_handed_axes, upright_axes
-from polyins.io.rows import ImuRows, Source
+from polyins.formats.rows import ImuRows, Source
+from polyins.model.axes import axes_matrix, right_handed_axes
 
 UP = np.array([0.3, -0.5, -9.8])
 

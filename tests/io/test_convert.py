@@ -9,8 +9,8 @@ import pytest
 from written_recordings import as_increments, fixes, still_imu, write_rows
 
 from polyins.errors import InputError
-from polyins.io import kf_gins, table
-from polyins.io.convert import convert
+from polyins.formats import kf_gins, table
+from polyins.tools.convert import convert
 
 
 @pytest.mark.parametrize(

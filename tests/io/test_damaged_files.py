@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from written_recordings import as_increments, fixes, still_imu, write_config, write_recording, write_rows
 
 from polyins.errors import InputError
-from polyins.io.inspect import inspect
-from polyins.loading import load
+from polyins.reading.loading import load
+from polyins.tools.inspect import inspect
 
 QUICK = settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
 LINES = st.lists(st.text(st.sampled_from("0123456789.,;-+ e\tnaxyzt#%:\"'[]{}\n"), max_size=40), max_size=8)

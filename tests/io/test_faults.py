@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from polyins.checks.faults import LONGEST_REPEAT, check_alive, clipped, without_faults
 from polyins.errors import InputError
-from polyins.io.faults import LONGEST_REPEAT, check_alive, clipped, without_faults
-from polyins.io.rows import ImuRows, Source
-from polyins.recording import ImuStream
+from polyins.formats.rows import ImuRows, Source
+from polyins.model.recording import ImuStream
 
 RATE_HZ = 100.0
 Array = NDArray[np.float64]

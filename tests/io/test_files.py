@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from polyins.errors import InputError
-from polyins.io.files import find, plain_suffix, read_bytes, read_text, whole, write_bytes
+from polyins.files import find, plain_suffix, read_bytes, read_text, whole, write_bytes
 
 
 def test_plain_goes_before_packed(tmp_path: Path) -> None:

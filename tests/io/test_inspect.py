@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from written_recordings import as_increments, fixes, still_imu, write_config, write_recording, write_rows
 
-from polyins.io.inspect import inspect, listing
+from polyins.tools.inspect import inspect, listing
 
 
 def test_imu_data(tmp_path: Path) -> None:

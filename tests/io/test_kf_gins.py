@@ -12,10 +12,10 @@ from hypothesis.extra.numpy import arrays
 from written_recordings import as_increments, fixes, still_imu, write_rows
 
 from polyins.errors import InputError
-from polyins.io import kf_gins
-from polyins.loading import load
-from polyins.recording import GnssStream, ImuStream
-from polyins.rig import DEG, HOUR
+from polyins.formats import kf_gins
+from polyins.model.recording import GnssStream, ImuStream
+from polyins.model.rig import DEG, HOUR
+from polyins.reading.loading import load
 
 CONFIGURATION = """\
 # as that program reads it

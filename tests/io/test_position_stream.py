@@ -10,8 +10,8 @@ import synthetic_solutions
 from written_recordings import as_increments, fixes, still_imu, write_config, write_recording, write_rows
 
 from polyins.errors import InputError
-from polyins.io.position_stream import load_reference
-from polyins.solution import Solution
+from polyins.model.solution import Solution
+from polyins.reading.reference import load_reference
 
 POINT = np.array([0.1, 0.2, 0.3])
 

@@ -9,8 +9,8 @@ import pytest
 from written_recordings import as_increments, fixes, still_imu, write_recording, write_rows
 
 from polyins.errors import InputError
-from polyins.io.propose import propose
-from polyins.loading import load
+from polyins.reading.loading import load
+from polyins.tools.propose import propose
 
 
 def save(folder: Path, text: str) -> Path:

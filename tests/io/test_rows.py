@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polyins.io.rows import ImuRows, Source, without
+from polyins.formats.rows import ImuRows, Source, without
 
 STEP = 0.01
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from polyins.errors import InputError
-from polyins.io.rtklib import read_gnss
-from polyins.loading import load
-from polyins.rig import DEG
+from polyins.formats.rtklib import read_gnss
+from polyins.model.rig import DEG
+from polyins.reading.loading import load
 
 HEADER = """\
 % program   : RTKPOST ver.2.4.3

@@ -10,8 +10,8 @@ from synthetic_solutions import drifting, drive, reference, solution
 
 from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
-from polyins.io.files import whole
-from polyins.io.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
+from polyins.files import whole
+from polyins.formats.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
 
 COLUMNS = {
     "time_s", "latitude_deg", "longitude_deg", "height_m", "north_velocity_m_s", "east_velocity_m_s",

@@ -15,10 +15,10 @@ from written_recordings import still_imu, write_rows
 
 from polyins.config import ImuColumns, TrackColumns
 from polyins.errors import InputError
-from polyins.io.columns import column_names, read_columns
-from polyins.io.table import read_imu, read_track, write_gnss, write_imu
-from polyins.recording import GnssStream, ImuStream
-from polyins.rig import DEG
+from polyins.formats.columns import column_names, read_columns
+from polyins.formats.table import read_imu, read_track, write_gnss, write_imu
+from polyins.model.recording import GnssStream, ImuStream
+from polyins.model.rig import DEG
 
 SCALES = {"rad/s": 1.0, "deg/s": 1 / DEG, "rad": 0.02, "deg": 0.02 / DEG, "m/s^2": 1.0, "g": 1 / 9.80665, "m/s": 0.02}
 

@@ -12,9 +12,9 @@ from rolling_files import RADIUS, REST_S, wheel_rows
 from written_recordings import write_config
 
 from polyins.errors import InputError
-from polyins.io.inspect import inspect
-from polyins.loading import load
-from polyins.rig import DEG, HOUR, MGAL, PPM
+from polyins.model.rig import DEG, HOUR, MGAL, PPM
+from polyins.reading.loading import load
+from polyins.tools.inspect import inspect
 
 VALUES: dict[str, Any] = {
     "imupath": "wheel.bin",

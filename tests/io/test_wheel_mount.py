@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polyins.config import WheelEntry
-from polyins.io.wheel_mount import wheel_rotation
+from polyins.config.wheel_mount import wheel_rotation
 
 AXES = ["x", "y", "z", "-x", "-y", "-z"]
 TILTS = st.tuples(st.floats(-19, 19), st.floats(-19, 19))

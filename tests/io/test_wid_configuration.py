@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from polyins import datasets
 from polyins.errors import InputError
-from polyins.io.wid import configuration
-from polyins.loading import load
-from polyins.recording import Recording
-from polyins.rig import DEG
+from polyins.model.recording import Recording
+from polyins.model.rig import DEG
+from polyins.reading import datasets
+from polyins.reading.loading import load
+from polyins.reading.wid import configuration
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +147,7 @@ def test_a_poor_trial_loads_and_its_bad_fixes_are_left_out(data_folder: Path) ->
 
 def test_offsets_of_clocks_that_nobody_knows(data_folder: Path, tmp_path: Path) -> None:
     """The configuration in force has what was found and finds nothing again."""
-    from polyins.io.yaml_document import write_yaml
+    from polyins.config.yaml_document import write_yaml
 
     values = configuration(data_folder / "wid", "08", gnss=True)
     values["imus"] = [imu for imu in values["imus"] if imu["name"] in ("IMU2", "CAR")]

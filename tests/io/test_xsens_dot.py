@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from polyins.errors import InputError
-from polyins.io.xsens_dot import read_imu
-from polyins.rig import DEG
+from polyins.formats.xsens_dot import read_imu
+from polyins.model.rig import DEG
 
 NAMES = "SampleTimeFine,Euler_X,Euler_Y,Euler_Z,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z"
 STEP_US = 8333

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from polyins.kernels import bank, share, strapdown
 from polyins.kernels.bank import LANES
-from polyins.rig import NoiseGrade
+from polyins.model.rig import NoiseGrade
 
 Array = NDArray[np.float64]
 

@@ -4,14 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from polyins import loading
-from polyins.io.yaml_document import read_yaml, write_yaml
+from polyins.config.yaml_document import read_yaml, write_yaml
 from polyins.live import lines
 from polyins.live.events import Epoch
 from polyins.live.replay import Replay
-from polyins.recording import Recording
+from polyins.model.recording import Recording
+from polyins.reading import loading
 from polyins.simulation import files
-from polyins.simulation.scenario import Board, Scenario, simulate
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Scenario
 
 
 @pytest.fixture(scope="session")

@@ -14,11 +14,12 @@ import pytest
 from click.testing import CliRunner
 from pyarrow import parquet
 
-from polyins import batch, cli
+from polyins import cli
 from polyins.errors import InputError
-from polyins.io.solution_files import read_solution
+from polyins.formats.solution_files import read_solution
 from polyins.live.run import Options, run
-from polyins.recording import Recording
+from polyins.model.recording import Recording
+from polyins.navigate import batch
 
 FAR = 30.0  # s
 PROGRAM = "import conftest, polyins.cli; polyins.cli.main()"

@@ -15,7 +15,7 @@ import test_documentation
 
 from polyins import cli
 from polyins.live import run as live_run
-from polyins.live import source
+from polyins.live import sources
 from polyins.live.run import Options
 
 PAGE = test_documentation.REPOSITORY / "docs" / "live.md"
@@ -115,7 +115,7 @@ def wait_until_heard(port: int) -> None:
 
 def test_every_kind_of_refusal_is_listed() -> None:
     text = PAGE.read_text().replace("\n", " ")
-    folder = Path(source.__file__).parent
+    folder = Path(sources.__file__).parent
     found: set[str] = set()
     for file in folder.glob("*.py"):
         code = file.read_text()
@@ -126,5 +126,5 @@ def test_every_kind_of_refusal_is_listed() -> None:
 
 def test_every_source_and_sink_is_listed() -> None:
     text = test_documentation.section("### polyins live")
-    for scheme in source._OPENERS:
+    for scheme in sources._OPENERS:
         assert f"`{scheme}://" in text or scheme == "stdin"

@@ -9,7 +9,6 @@ from pathlib import Path
 import flooding
 import pytest
 
-from polyins import loading
 from polyins.live.datagrams import Datagrams, lines_of
 from polyins.live.events import RefusedError
 from polyins.live.intake import Intake
@@ -17,6 +16,7 @@ from polyins.live.session import Session
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
 from polyins.live.starter import Starter
+from polyins.reading import loading
 
 JUNK = 20
 """datagrams for each good one"""
@@ -46,7 +46,7 @@ def with_junk(datagrams: list[bytes]) -> Iterator[tuple[str, bytes]]:
 
 def navigated(config: Path, datagrams: list[tuple[str, bytes]], epochs: int) -> tuple[list[object], Counter[str]]:
     """Take datagrams, the good ones at the time that their number says, and return the states and what was refused."""
-    from polyins.navigator import Navigator
+    from polyins.navigate.navigator import Navigator
 
     settings, document, _ = loading.read_config(config)
     blank, _ = loading.without_data(settings, document)

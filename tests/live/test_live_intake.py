@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from polyins import loading
+from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
-from polyins.io.yaml_document import write_yaml
 from polyins.live.events import GnssEpoch, ImuEpoch, RefusedError
 from polyins.live.intake import Intake
+from polyins.reading import loading
 
 IMU = {"name": "a", "axes": ["x", "-y", "-z"], "mount_deg": [0.0, 0.0, 90.0], "clock_offset_s": -2.5}
 FIX = GnssEpoch(7.0, np.array([0.8, 0.2, 500.0]), np.ones(3), np.ones(3), np.ones(3))

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polyins.attitude import quaternions
 from polyins.live import nmea
 from polyins.live.snapshot import Snapshot
+from polyins.model.attitude import quaternions
 
 
 def snapshot(

@@ -21,7 +21,8 @@ import pytest
 from polyins.errors import InputError
 from polyins.live import gpsd
 from polyins.live.events import Epoch, GnssEpoch, RefusedError
-from polyins.live.source import Source, open_source
+from polyins.live.source import Source
+from polyins.live.sources import open_source
 
 NAMES = ("imu1", "imu2", "imu3")
 FAR = 10.0  # s, within which anything happens

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from polyins.alignment import Start
 from polyins.live.events import Epoch, GnssEpoch, ImuEpoch
 from polyins.live.starter import KEPT, Starter
-from polyins.recording import Recording, StartOptions
+from polyins.model.recording import Recording, StartOptions
+from polyins.prepare.alignment import Start
 
 DELAY = 0.5
 

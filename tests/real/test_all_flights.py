@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from polyins.reproduce import flights
+from polyins.studies import flights
 
 FIRST_STUDY = {"outage_5s": (0.60, 0.53), "outage_10s": (2.16, 1.86)}
 """rms of the outage maxima, m, single and array: README of the data set"""

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from polyins import batch
-from polyins.recording import Recording
-from polyins.reproduce import flights
-from polyins.reproduce.flights import Outage, Row
+from polyins.model.recording import Recording
+from polyins.navigate import batch
+from polyins.studies import flights
+from polyins.studies.flights import Outage, Row
 
 CHOSEN = ("Horizontal/path_5", "Horizontal/path_22", "Vertical/path_8")
 """one of three sessions each"""

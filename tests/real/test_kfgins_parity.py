@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from polyins import batch
-from polyins.geodesy import metres_per_unit
-from polyins.loading import load
-from polyins.solution import Solution
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.solution import Solution
+from polyins.navigate import batch
+from polyins.reading.loading import load
 
 Array = NDArray[np.float64]
 

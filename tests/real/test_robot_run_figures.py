@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from polyins.reproduce import b6, b7
-from polyins.reproduce.robot import FEW, score, score_all, solve, table
-from polyins.reproduce.robot_experiments import EXPERIMENTS, truth
-from polyins.reproduce.sites import Site
-from polyins.reproduce.vehicles import ROBOT
+from polyins_papers import b6, b7
+from polyins_papers.robot import FEW, score, score_all, solve, table
+from polyins_papers.robot_experiments import EXPERIMENTS, truth
+from polyins_papers.sites import Site
+from polyins_papers.vehicles import ROBOT
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from polyins import batch
-from polyins.loading import load
-from polyins.solution import Solution
+from polyins.model.solution import Solution
+from polyins.navigate import batch
+from polyins.reading.loading import load
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from polyins import datasets
-from polyins.methods import find_method
-from polyins.modules import choose
-from polyins.reproduce import wid
+from polyins.model.methods import find_method
+from polyins.navigate.modules import choose
+from polyins.reading import datasets
+from polyins.studies import wid
 
 MOST_DRIFT = {
     "wheel-ins/IMU2": 0.45,

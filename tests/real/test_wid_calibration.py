@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from polyins import datasets
 from polyins.calibration.drive import Calibration, calibrate
 from polyins.calibration.offsets import gnss_offset, imu_offsets
-from polyins.io.yaml_document import read_yaml
-from polyins.recording import Recording
+from polyins.config.yaml_document import read_yaml
+from polyins.model.recording import Recording
+from polyins.reading import datasets
 
 WHEELS = [f"IMU{number}{place}" for number in (1, 2, 3, 4) for place in ("", "_radial")]
 GROUPS_S = 132.711

@@ -6,7 +6,7 @@ import pytest
 from synthetic_solutions import drifting, drive, recording, reference
 
 from polyins.evaluation.summary import comparison, summarize
-from polyins.recording import Recording
+from polyins.model.recording import Recording
 from polyins.report import write_report
 
 OUTAGES = ((1030.0, 1060.0), (1120.0, 1150.0), (1210.0, 1240.0))

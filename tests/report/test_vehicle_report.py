@@ -9,10 +9,10 @@ import pytest
 from plotted import plotted
 from synthetic_solutions import drifting, drive, no_innovations, recording, reference
 
-from polyins.attitude import rotation_matrices
 from polyins.evaluation.summary import comparison, on_wheels, summarize
-from polyins.geodesy import displacement
-from polyins.recording import Recording
+from polyins.model.attitude import rotation_matrices
+from polyins.model.geodesy import displacement
+from polyins.model.recording import Recording
 from polyins.report import write_report
 from polyins.report.drift_curves import drift_figure
 from polyins.report.error_curves import attitude_figure, position_figure

@@ -1,6 +1,6 @@
 """The covariance of a single filter fits its errors."""
 
-from polyins.reproduce import consistency
+from polyins.studies import consistency
 
 
 def test_nees_lies_inside_its_bounds() -> None:

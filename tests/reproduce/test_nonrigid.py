@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from polyins import batch
 from polyins.evaluation.errors import compare_to_reference
-from polyins.recording import ImuStream, Recording
-from polyins.reproduce import a5, a6, nonrigid
-from polyins.reproduce.feedback import outage_maxima
-from polyins.reproduce.progress import Steps
-from polyins.reproduce.rigid_array import Array, maxima
+from polyins.model.recording import ImuStream, Recording
+from polyins.navigate import batch
 from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Book
 from polyins.simulation.scenario import Scenario
 from polyins.simulation.shaking import shake
+from polyins.studies.progress import Steps
+from polyins.studies.rigid_array import Array, maxima
+from polyins_papers import a5, a6, nonrigid
+from polyins_papers.feedback import outage_maxima
 
 SECONDS = 150.0
 

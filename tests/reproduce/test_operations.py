@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from polyins.reproduce import a1, a2, operations
-from polyins.reproduce.operations import Counted, count, counting
+from polyins_papers import a1, a2, operations
+from polyins_papers.operations import Counted, count, counting
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from polyins import bench
-from polyins.recording import ImuStream
-from polyins.reproduce import a3, a4, afig3, chips, rigid_array, split
-from polyins.reproduce.progress import Steps
-from polyins.reproduce.scenario_files import read
+from polyins.model.recording import ImuStream
 from polyins.simulation.imu_errors import Imperfections, corrupt, draw_errors
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Scenario
+from polyins.studies import chips, rigid_array, split
+from polyins.studies.progress import Steps
+from polyins.studies.scenario_files import read
+from polyins.tools import bench
+from polyins_papers import a3, a4, afig3
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> Scenario:
 
 
 def test_the_scenario_has_the_real_outages() -> None:
-    scenario = read(Scenario, "a3")
+    scenario = read(Scenario, "polyins.studies", "a3")
     outages = scenario.outage_intervals()
     assert scenario.replay is not None
     first = scenario.replay.from_s

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from polyins.config import Noise
-from polyins.reproduce import b4, b5, b7, b8, bfig8, bfig10, sites, subsystems
-from polyins.reproduce.b6 import PAPER as TABLE_VI
-from polyins.reproduce.robot import CONFIGURATIONS
-from polyins.reproduce.vehicles import CAR, ROBOT
+from polyins_papers import b4, b5, b7, b8, bfig10, sites, subsystems
+from polyins_papers.b6 import PAPER as TABLE_VI
+from polyins_papers.robot import CONFIGURATIONS
+from polyins_papers.vehicles import CAR, ROBOT
 
 SHORT_S = 115.0
 
@@ -73,20 +73,21 @@ def test_who_is_best_counts_for_both_where_two_are():
 
 
 def test_figures_of_a_system_and_its_parts(without_data, tmp_path):
-    document = bfig8.reproduce(quick=True, out=tmp_path)
+    document = subsystems.bfig8(quick=True, out=tmp_path)
     assert (tmp_path / "bfig8.html").stat().st_size > 10_000
     assert same_keys(document["paper"], document["polyins"])
     # the chips of a figure are those of the tables, in the order that the page says
-    assert bfig8.PAPER["Body/Wheel-INS"] == b5.PAPER["body-wheel-ins"][5]
-    assert b5.RUNS["body-wheel-ins"][5] == bfig8.RUNS["Body/Wheel-INS"]
+    curves = subsystems.FIGURES["bfig8"]
+    assert curves.paper["Body/Wheel-INS"] == b5.PAPER["body-wheel-ins"][5]
+    assert b5.RUNS["body-wheel-ins"][5] == curves.runs["Body/Wheel-INS"]
 
 
 def test_a_system_lies_between_its_parts_or_not():
     from synthetic_solutions import drive, solution
 
     from polyins.evaluation.errors import compare_to_reference
-    from polyins.geodesy import metres_per_unit
-    from polyins.recording import Reference
+    from polyins.model.geodesy import metres_per_unit
+    from polyins.model.recording import Reference
 
     truth = drive(roll=0.0)
     reference = Reference(truth.time, truth.geodetic, truth.velocity, truth.euler)

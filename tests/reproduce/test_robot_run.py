@@ -8,17 +8,17 @@ import pytest
 from synthetic_solutions import drive, solution
 
 from polyins.evaluation.errors import compare_to_reference
-from polyins.geodesy import metres_per_unit
-from polyins.methods import find_method
-from polyins.modules import choose
-from polyins.recording import Reference
-from polyins.reproduce import b6, b7, robot_experiments
-from polyins.reproduce.robot import CONFIGURATIONS, FEW, Score, as_in_the_paper, at_the_reference, by_seed, score, table
-from polyins.reproduce.sites import site
-from polyins.reproduce.vehicles import ROBOT
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.methods import find_method
+from polyins.model.recording import Reference
+from polyins.navigate.modules import choose
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario
+from polyins_papers import b6, b7, robot_experiments
+from polyins_papers.robot import CONFIGURATIONS, FEW, Score, as_in_the_paper, at_the_reference, by_seed, score, table
+from polyins_papers.sites import site
+from polyins_papers.vehicles import ROBOT
 
 RUNS = {"wheel-ins": 8, "dual-wheel-ins": 16, "body-wheel-ins": 16, "triple-ins": 16}
 

@@ -4,17 +4,20 @@ from importlib import resources
 
 import pytest
 
-from polyins.io.yaml_document import read_yaml
-from polyins.reproduce import a3, a5, nonrigid
-from polyins.reproduce.robot_experiments import EXPERIMENTS, SIZES
-from polyins.reproduce.scenario_files import read, scenarios
-from polyins.reproduce.vehicles import CHIPS, GYRO_SCALE_PPM
+from polyins.config.yaml_document import read_yaml
 from polyins.simulation.scenario import Scenario
+from polyins.studies.scenario_files import read, scenarios
+from polyins_papers import a3, a5, nonrigid
+from polyins_papers.robot_experiments import EXPERIMENTS, SIZES
+from polyins_papers.vehicles import CHIPS, GYRO_SCALE_PPM
 
 ROW = {"single": 4.0, "enav-fusion": 1.0, "ratio": 4.0, "costs": 0.0}
 EXAMPLE = {"before": ROW, "g-sensitivity": ROW}, {"g-sensitivity": {**ROW, "single": 8.0}}
 
-SINGLE = ("a3", "lawn", "books", "robot", "car", "consistency")
+STUDIES, PAPERS = "polyins.studies", "polyins_papers"
+SINGLE = {"a3": STUDIES, "consistency": STUDIES, "lawn": PAPERS, "books": PAPERS, "robot": PAPERS, "car": PAPERS}
+SEVERAL = {"array": STUDIES, "afig3": PAPERS, "laps": PAPERS}
+OTHERS = {"chips": STUDIES, "flights": STUDIES, "upper": PAPERS, "experiments": PAPERS}
 ALWAYS = {"rate_hz", "static_s", "noise", "gnss"}
 OF_WAYS = {
     "shuttle": {"speed_m_s", "straight_m", "turn_radius_m", "speed_up_s", "steer_s"},
@@ -30,12 +33,12 @@ OF_WAYS = {
 
 @pytest.mark.parametrize("name", SINGLE)
 def test_a_table_rests_on_no_default(name: str) -> None:
-    says_all(read(Scenario, name), ALWAYS)
+    says_all(read(Scenario, SINGLE[name], name), ALWAYS)
 
 
-@pytest.mark.parametrize("name", ["array", "afig3", "laps"])
+@pytest.mark.parametrize("name", SEVERAL)
 def test_nor_does_a_curve(name: str) -> None:
-    for key, scenario in scenarios(name).items():
+    for key, scenario in scenarios(SEVERAL[name], name).items():
         says_all(scenario, ALWAYS if key not in ("robot", "car", "six filters") else set())
 
 
@@ -51,15 +54,13 @@ def says_all(scenario: Scenario, keys: set[str]) -> None:
         assert {"radius_m", "chips", "lever_arm_m"} <= wheel.model_fields_set
 
 
-def test_every_file_is_read() -> None:
-    names = {
-        file.name.removesuffix(".yaml")
-        for file in resources.files("polyins.reproduce").iterdir()
-        if file.name.endswith(".yaml")
-    }
-    assert names == {*SINGLE, "array", "afig3", "laps", "chips", "upper", "experiments", "flights"}
-    for name in names:
-        with resources.as_file(resources.files("polyins.reproduce") / f"{name}.yaml") as file:
+@pytest.mark.parametrize("package", [STUDIES, PAPERS])
+def test_every_file_is_read(package: str) -> None:
+    files = [file for file in resources.files(package).iterdir() if file.name.endswith(".yaml")]
+    known = {name for name, home in (SINGLE | SEVERAL | OTHERS).items() if home == package}
+    assert {file.name.removesuffix(".yaml") for file in files} == known
+    for found in files:
+        with resources.as_file(found) as file:
             assert read_yaml(file).values
 
 
@@ -92,7 +93,7 @@ def test_experiments_are_named_by_their_sizes() -> None:
 
 
 def test_what_a3_says_of_its_files_is_so() -> None:
-    assert f"told {read(Scenario, 'a3').noise.accel_bias_mgal[0]:g} mGal" in a3.UNAWARE
+    assert f"told {read(Scenario, STUDIES, 'a3').noise.accel_bias_mgal[0]:g} mGal" in a3.UNAWARE
     upper = a3.UPPER.errors
     assert upper.model_fields_set == {key for name in a3.CANDIDATES for key in a3.SOURCES[name]}
     assert f"to {upper.g_sensitivity_deg_s_g:g})" in a3.statement(*EXAMPLE)

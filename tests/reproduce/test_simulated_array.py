@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from polyins.reproduce import array
+from polyins.studies import array
 
 
 def test_sixteen_independent_imus_gain_more_than_three_point_two(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from polyins.reproduce import a5, nonrigid
-from polyins.reproduce.progress import Steps
+from polyins.studies.progress import Steps
+from polyins_papers import a5, nonrigid
 
 SEEDS = a5.BLOCK
 METHODS = ("single", "imu-fusion", "nav-fusion")

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,10 @@ import pytest
 
 from polyins.cli import cli
 from polyins.errors import InputError
-from polyins.reproduce import afig6, afig7, targets, together
+from polyins.reading import catalogue
+from polyins.studies import reproduction, targets
+from polyins.studies.target import Target, named
+from polyins_papers import afig6, afig7
 
 Document = dict[str, Any]
 
@@ -19,28 +23,23 @@ def stand_in(name: str) -> Document:
     return {"target": name, "paper": {"x_m": 1.0}, "polyins": {"x_m": 2.0}, "settings": settings}
 
 
-@pytest.fixture
-def without_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    def find(name: str, out: Path) -> Callable[[bool, Callable[[float], None]], Document]:
-        def run(quick: bool, progress: Callable[[float], None]) -> Document:
-            assert quick
-            progress(0.5)
-            if name == "flights":
-                raise InputError("data set quadrotor is not at hand")
-            (out / f"{name}-picture.html").write_text("<p>picture</p>")
-            return stand_in(name)
-
-        return run
-
-    monkeypatch.setattr(targets, "find_target", find)
+def draw(name: str, quick: bool, progress: Callable[[float], None], out: Path) -> Document:
+    assert quick
+    progress(0.5)
+    if name == "flights":
+        raise InputError("data set quadrotor is not at hand")
+    (out / f"{name}-picture.html").write_text("<p>picture</p>")
+    return stand_in(name)
 
 
-@pytest.mark.usefixtures("without_work")
+flights, a3, a4 = (partial(draw, name) for name in ("flights", "a3", "a4"))
+ROWS = [Target(name, f"{__name__}:{name}", pictures=True) for name in ("flights", "a3", "a4")]
+
+
 def test_all_targets_are_one_document_and_one_page(tmp_path: Path) -> None:
     shares: list[float] = []
     told: list[str] = []
-    names = ("flights", "a3", "a4")
-    document = together.reproduce("all", names, True, tmp_path, shares.append, told.append)
+    document = reproduction.reproduce("all", ROWS, True, tmp_path, shares.append, told.append)
     assert document["target"] == "all"
     assert list(document["polyins"]) == ["a3", "a4"]
     assert set(document["paper"]) == set(document["polyins"]) == set(document["settings"])
@@ -48,7 +47,7 @@ def test_all_targets_are_one_document_and_one_page(tmp_path: Path) -> None:
     assert any("quadrotor" in text for text in told)
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
-    assert together.parts(document)[0] == stand_in("a3")
+    assert reproduction.parts(document)[0]["polyins"] == stand_in("a3")["polyins"]
     page = (tmp_path / "index.html").read_text()
     for expected in ("a3-picture.html", "a4.json", "stand in", "quadrotor", "x_m"):
         assert expected in page
@@ -56,9 +55,16 @@ def test_all_targets_are_one_document_and_one_page(tmp_path: Path) -> None:
     assert not (tmp_path / "flights.json").exists()
 
 
-def test_targets_of_pictures_are_targets() -> None:
-    assert set(targets.WITH_REPORTS) <= set(targets.TARGETS)
-    assert set(together.SECONDS) | set(together.ALONE) <= set(targets.TARGETS)
+def test_every_row_runs_a_function_and_names_data_sets_that_are_known() -> None:
+    for target in targets.known().values():
+        assert callable(named(target.run))
+        assert not target.print_tables or callable(named(target.print_tables))
+        assert set(target.datasets) <= set(catalogue.names())
+
+
+def test_both_papers_are_found_by_entry_point() -> None:
+    assert {"a3", "b6"} <= set(targets.known())
+    assert {target.name for target in targets.find("figures")} < {target.name for target in targets.find("all")}
 
 
 @pytest.mark.parametrize("quick", [True, False])

@@ -8,11 +8,11 @@ import pytest
 from synthetic_solutions import GRADE, drive, solution
 
 from polyins.errors import InputError
-from polyins.recording import ImuStream, Recording, Reference
-from polyins.reproduce import wid
-from polyins.reproduce.targets import print_document
-from polyins.reproduce.wid import Track, Trial
-from polyins.rig import Imu, Rig
+from polyins.model.recording import ImuStream, Recording, Reference
+from polyins.model.rig import Imu, Rig
+from polyins.studies import wid
+from polyins.studies.reproduction import print_document
+from polyins.studies.wid import Track, Trial
 
 EAST = np.radians(90.0)
 ANTENNA = np.array([2.0, -1.0, 0.0])

@@ -7,11 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from polyins.errors import InputError
-from polyins.rig import DEG, HOUR, NoiseGrade
+from polyins.model.rig import DEG, HOUR, NoiseGrade
 from polyins.simulation.error_scenario import ChipCalibration, Errors
 from polyins.simulation.imu_errors import Imperfections, corrupt, draw_errors
+from polyins.simulation.run import simulate
 from polyins.simulation.sampling import jittered, rounded
-from polyins.simulation.scenario import Board, Scenario, simulate
+from polyins.simulation.scenario import Board, Scenario
 from polyins.simulation.shared_noise import SharedNoise
 from polyins.simulation.triads import Calibration, skewed
 

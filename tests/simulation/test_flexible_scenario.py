@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from polyins.errors import InputError
-from polyins.reproduce import nonrigid
 from polyins.simulation import flexible_scenario
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.error_scenario import Errors
 from polyins.simulation.road import ground
-from polyins.simulation.run import record, true_run
-from polyins.simulation.scenario import read_scenario, simulate
+from polyins.simulation.run import record, simulate, true_run
+from polyins.simulation.scenario import read_scenario
+from polyins_papers import nonrigid
 
 TESTS = tuple(nonrigid.FILES)
 SHORT = nonrigid.scenario_of("test A", quick=True).model_copy(

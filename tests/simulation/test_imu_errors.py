@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from polyins.rig import NoiseGrade
+from polyins.model.rig import NoiseGrade
 from polyins.simulation.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors, gauss_markov
 
 GRADE = NoiseGrade.from_datasheet(

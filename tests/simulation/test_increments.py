@@ -6,7 +6,7 @@ from mechanization import mechanize
 from scipy.spatial.transform import Rotation
 from scipy.special import jv
 
-from polyins.attitude import quaternions, rotation_matrices
+from polyins.model.attitude import quaternions, rotation_matrices
 from polyins.simulation import earth
 from polyins.simulation.increments import increments
 from polyins.simulation.path import drive, path

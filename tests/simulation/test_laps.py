@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from polyins.errors import InputError
-from polyins.reproduce.vehicles import CAR, ROBOT
 from polyins.simulation.laps import lap_length, lap_points
 from polyins.simulation.plane import Plane
 from polyins.simulation.run import true_run
 from polyins.simulation.scenario import read_scenario
 from polyins.simulation.wheel_scenario import Laps
+from polyins_papers.vehicles import CAR, ROBOT
 
 LAPS = Laps(length_m=40.0, width_m=20.0, corner_m=4.0, count=3, speed_m_s=1.5, change_m_s=0.5)
 

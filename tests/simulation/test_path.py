@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymap3d import ecef2ned, geodetic2ecef
 
-from polyins.attitude import rotation_matrices
+from polyins.model.attitude import rotation_matrices
 from polyins.simulation import earth
 from polyins.simulation.path import Driving, drive, path, smooth_steps
 

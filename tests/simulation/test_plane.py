@@ -2,7 +2,7 @@ import numpy as np
 from curves import Line
 from pymap3d import geodetic2ned
 
-from polyins.attitude import quaternions, rotation_matrices
+from polyins.model.attitude import quaternions, rotation_matrices
 from polyins.simulation.gnss import fixes, with_lies
 from polyins.simulation.increments import increments
 from polyins.simulation.path import drive, path

@@ -3,12 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from polyins.io.table import read_track
-from polyins.loading import load
-from polyins.recording import FilterOptions, Reference, StartOptions
-from polyins.rig import ImuErrors
+from polyins.formats.table import read_track
+from polyins.model.recording import FilterOptions, Reference, StartOptions
+from polyins.model.rig import ImuErrors
+from polyins.reading.loading import load
 from polyins.simulation.files import write, write_reference
-from polyins.simulation.scenario import Board, Fixes, Scenario, simulate
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Fixes, Scenario
 
 SCENARIO = Scenario(
     name="round trip",

@@ -8,14 +8,14 @@ import pytest
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
-from polyins.geodesy import displacement
-from polyins.reproduce.rigid_array import base_scenario
-from polyins.rig import DEG
+from polyins.model.geodesy import displacement
+from polyins.model.rig import DEG
 from polyins.simulation.drive_scenario import Drive, Replay
 from polyins.simulation.path import Driving, Path, drive
 from polyins.simulation.replay import HELD_BELOW, Ride, replay
-from polyins.simulation.run import true_run
-from polyins.simulation.scenario import read_scenario, simulate
+from polyins.simulation.run import simulate, true_run
+from polyins.simulation.scenario import read_scenario
+from polyins.studies.rigid_array import base_scenario
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@ import pytest
 from curves import Line
 from rolled import CENTRE, LEVER_ARM, RADIUS, WORLDS, drawn, in_body, wheel
 
-from polyins.geodesy import metres_per_unit
+from polyins.model.geodesy import metres_per_unit
 from polyins.simulation.ground import without_twist
 from polyins.simulation.path import Driving, drive, path
 from polyins.simulation.plane import Plane

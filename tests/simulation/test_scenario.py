@@ -6,19 +6,10 @@ from ruamel.yaml import YAML
 
 from polyins.config import Noise, OutageSchedule
 from polyins.errors import InputError
-from polyins.geodesy import metres_per_unit
+from polyins.model.geodesy import metres_per_unit
 from polyins.simulation.increments import increments
-from polyins.simulation.scenario import (
-    Board,
-    Errors,
-    Fixes,
-    Lies,
-    Scenario,
-    demo,
-    read_scenario,
-    simulate,
-    simulate_with_truth,
-)
+from polyins.simulation.run import simulate, simulate_with_truth
+from polyins.simulation.scenario import Board, Errors, Fixes, Lies, Scenario, demo, read_scenario
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SHORT = Scenario(duration_s=60.0, static_s=10.0, rate_hz=50.0, imus=Board(count=3), outages=((30.0, 40.0),))

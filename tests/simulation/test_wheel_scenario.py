@@ -5,13 +5,13 @@ import pytest
 
 from polyins.config import Rolling
 from polyins.errors import InputError
-from polyins.loading import load
-from polyins.reproduce.vehicles import ROBOT
+from polyins.reading.loading import load
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.files import write
-from polyins.simulation.run import record, true_run
-from polyins.simulation.scenario import Board, Errors, Scenario, read_scenario, simulate, simulate_with_truth
+from polyins.simulation.run import record, simulate, simulate_with_truth, true_run
+from polyins.simulation.scenario import Board, Errors, Scenario, read_scenario
 from polyins.simulation.wheel_scenario import Slip, Track, WheelModule
+from polyins_papers.vehicles import ROBOT
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "robot.yaml"
 PERFECT = Errors(noise=False, biases=False, scales=False)

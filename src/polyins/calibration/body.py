@@ -14,8 +14,8 @@ import numpy as np
 from polyins.calibration.motion import Motion, Running
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
-from polyins.recording import Array
-from polyins.rig import DEG
+from polyins.model.recording import Array
+from polyins.model.rig import DEG
 
 WINDOW = 2.0  # s
 STEP = 0.25  # s

@@ -9,8 +9,8 @@ from typing import Any
 
 from polyins.calibration.drive import ASIDE, Calibration, Estimate
 from polyins.config import Config
-from polyins.io.yaml_document import write_yaml
-from polyins.recording import Offset
+from polyins.config.yaml_document import write_yaml
+from polyins.model.recording import Offset
 
 Values = dict[str, Any]
 DIGITS = 7

@@ -12,11 +12,11 @@ from polyins.calibration.motion import Motion, Running, motion
 from polyins.calibration.radius import rolling_radius
 from polyins.calibration.wheels import SpinAxis, lever_arm, spin_axis, turns
 from polyins.config import WheelEntry
+from polyins.config.wheel_mount import wheel_rotation
 from polyins.errors import InputError
-from polyins.geodesy import displacement
-from polyins.io.wheel_mount import wheel_rotation
-from polyins.recording import Array, Offset, Recording
-from polyins.rig import DEG, Imu
+from polyins.model.geodesy import displacement
+from polyins.model.recording import Array, Offset, Recording
+from polyins.model.rig import DEG, Imu
 
 ASIDE = "~"
 CLEAR_SENSE = 0.5
@@ -226,7 +226,7 @@ def _body_estimates(imu: Imu, moved: Motion, rolled: Running, height: Running | 
 
 def _nearest_axes(rotation: Array) -> Array:
     """Return the permutation of axes, with signs, that is nearest to a rotation, shape (3, 3)."""
-    from polyins.io.checks import axes_matrix, right_handed_axes
+    from polyins.model.axes import axes_matrix, right_handed_axes
 
     matrices = [axes_matrix(axes) for axes in right_handed_axes()]
     return max(matrices, key=lambda matrix: float(np.sum(matrix * rotation)))

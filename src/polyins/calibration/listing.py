@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from polyins import __version__
 from polyins.calibration.drive import ASIDE, Calibration, Estimate
+from polyins.version import __version__
 
 COLUMNS = ["setting", "estimate", "std", "configured"]
 DECIMALS = {"m": 5, "deg": 3}

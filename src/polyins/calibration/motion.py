@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from polyins.recording import Array, ImuStream
-from polyins.timesync import GAP
+from polyins.model.recording import Array, ImuStream
+from polyins.prepare.timesync import GAP
 
 
 @dataclass(frozen=True)

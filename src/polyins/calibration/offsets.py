@@ -18,9 +18,9 @@ from polyins.calibration.motion import Running, motion
 from polyins.calibration.regression import BLOCKS, blocks, huber, jackknife_covariance
 from polyins.calibration.wheels import spin_axis, turns
 from polyins.errors import InputError
-from polyins.geodesy import displacement
-from polyins.recording import Array, GnssStream, ImuStream, Offset
-from polyins.rig import Imu
+from polyins.model.geodesy import displacement
+from polyins.model.recording import Array, GnssStream, ImuStream, Offset
+from polyins.model.rig import Imu
 
 WINDOW = 1.0
 """s: increments over so long are compared; shorter ones show the road, which each sensor feels in its own way"""

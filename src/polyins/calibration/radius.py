@@ -7,7 +7,7 @@ import numpy as np
 from polyins.calibration.motion import Running
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
-from polyins.recording import Array
+from polyins.model.recording import Array
 
 WINDOW = 1.0  # s
 LEAST_SPEED = 1.0  # m/s: slower than this the noise of a fix lengthens the way

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.recording import Array
+from polyins.model.recording import Array
 
 BLOCKS = 8
 """Residuals of wheels on a road are correlated over seconds: pieces of this many leave-one-out estimates are not."""

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from polyins.calibration.motion import Motion, Running, smoothed
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
-from polyins.recording import Array
-from polyins.rig import DEG
+from polyins.model.recording import Array
+from polyins.model.rig import DEG
 
 LARGEST_BIAS = 10.0 * DEG  # rad/s: a wheel that turns faster rolls
 WINDOW = 1.0  # s

@@ -13,9 +13,9 @@ from polyins.config.imu import ImuEntry, ImuSettings
 from polyins.config.positions import GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling
 from polyins.config.timing import Outages, Start
+from polyins.config.yaml_document import Document, Key
 from polyins.errors import InputError
-from polyins.io.yaml_document import Document, Key
-from polyins.recording import FilterOptions
+from polyins.model.recording import FilterOptions
 
 SomeSection = TypeVar("SomeSection", bound=Section)
 

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import model_validator
 
 from polyins.config.fields import ORIGIN, NotNegative, Pair, Positive, PositiveSpread, Section, Triple, blame
-from polyins.recording import RollingOptions
-from polyins.rig import Vector
+from polyins.model.recording import RollingOptions
+from polyins.model.rig import Vector
 
 SPEED = RollingOptions()
 

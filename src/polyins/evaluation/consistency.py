@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.evaluation.errors import Errors
-from polyins.solution import Innovations, Solution
+from polyins.model.solution import Innovations, Solution
 
 Array = NDArray[np.float64]
 

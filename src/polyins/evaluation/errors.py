@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.attitude import angular_rate, euler_angles, rotation_matrices, wrap
 from polyins.errors import InputError
-from polyins.geodesy import metres_per_unit
-from polyins.recording import Reference
-from polyins.rig import Vector
-from polyins.solution import Solution
+from polyins.model.attitude import angular_rate, euler_angles, rotation_matrices, wrap
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.recording import Reference
+from polyins.model.rig import Vector
+from polyins.model.solution import Solution
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from polyins.evaluation.consistency import mean_nis, position_nees
 from polyins.evaluation.errors import ANGLES, ROUNDING_S, Errors, compare_to_reference, path_length
 from polyins.evaluation.outages import Interval
 from polyins.evaluation.summary import NO_FIGURES, Document, Extent, document
-from polyins.recording import Reference, usual_interval
-from polyins.solution import Solution
+from polyins.model.recording import Reference, usual_interval
+from polyins.model.solution import Solution
 
 Array = NDArray[np.float64]
 

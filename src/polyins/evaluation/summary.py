@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins import __version__
 from polyins.evaluation.consistency import consistency
 from polyins.evaluation.drift import drift
 from polyins.evaluation.errors import Errors, compare_to_reference, rms
 from polyins.evaluation.outages import Interval, outage_statistic, partly_covered
-from polyins.methods import METHODS
-from polyins.recording import Reference
-from polyins.solution import Innovations, Solution
+from polyins.formats.documents import plain
+from polyins.model.methods import METHODS
+from polyins.model.recording import Reference
+from polyins.model.solution import Innovations, Solution
+from polyins.version import __version__
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -212,19 +213,6 @@ def on_wheels(summary: Mapping[str, Any]) -> bool:
     """Return whether wheels aided the run; of a method that is not known, as in a solution from elsewhere, no."""
     row = METHODS.get(summary["method"].split("/")[0])
     return row is not None and row.rolling
-
-
-def plain(value: object) -> Any:
-    """Return `value` as JSON knows it: arrays as lists, NumPy's numbers as Python's, None for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
 
 
 def _gnss(innovations: Innovations) -> Document:

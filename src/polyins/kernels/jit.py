@@ -22,7 +22,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 PACKAGE = Path(__file__).parents[1]
-COMPILED = ("kernels/*.py", "aiding/*.py", "engine.py", "simulation/flexible.py")
+COMPILED = ("kernels/*.py", "aiding/*.py", "navigate/engine.py", "simulation/flexible.py")
 
 
 def _cache_folder() -> Path:

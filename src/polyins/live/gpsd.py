@@ -10,7 +10,7 @@ import numpy as np
 
 from polyins.live.events import Array, GnssEpoch, RefusedError
 from polyins.live.lines import geodetic_position
-from polyins.rig import DEG
+from polyins.model.rig import DEG
 
 PORT = 2947
 WATCH = b'?WATCH={"enable":true,"json":true};\n'

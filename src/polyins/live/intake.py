@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from polyins.config import Config
-from polyins.geodesy import displacement
 from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError
-from polyins.rig import DEG, Rig
+from polyins.model.geodesy import displacement
+from polyins.model.rig import DEG, Rig
 
 
 class Intake:

@@ -19,7 +19,7 @@ from operator import xor
 import numpy as np
 
 from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError
-from polyins.rig import DEG
+from polyins.model.rig import DEG
 
 MAGIC = "polyins1"
 LONGEST = 512

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polyins.alignment import Start
 from polyins.live.replay import Replay
 from polyins.live.session import Session
 from polyins.live.sinks import Outlet, ParquetLog
 from polyins.live.starter import Starter
-from polyins.recording import GnssStream, ImuStream, Recording, StartOptions
+from polyins.model.recording import GnssStream, ImuStream, Recording, StartOptions
+from polyins.prepare.alignment import Start
 
 if TYPE_CHECKING:
-    from polyins.navigator import Navigator
+    from polyins.navigate.navigator import Navigator
 
 SECONDS = 8.0
 RATE_HZ = 50.0

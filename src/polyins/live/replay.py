@@ -12,7 +12,7 @@ import numpy as np
 
 from polyins.live.events import Epoch, GnssEpoch, ImuEpoch
 from polyins.live.source import POLL
-from polyins.recording import Recording
+from polyins.model.recording import Recording
 
 AT_ONCE = 256
 """epochs in a chunk"""

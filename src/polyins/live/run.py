@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polyins import __version__, loading, modules, results
-from polyins.alignment import Start
 from polyins.config import Config
+from polyins.config.yaml_document import Document
 from polyins.errors import InputError
-from polyins.io.yaml_document import Document
+from polyins.files import make_folder
+from polyins.formats.documents import write_document
+from polyins.kernels.compilation import compilation_said
 from polyins.live.events import Epoch, RefusedError
 from polyins.live.inbox import Inbox
 from polyins.live.intake import Intake
@@ -30,14 +31,19 @@ from polyins.live.rehearsal import rehearse
 from polyins.live.replay import Replay
 from polyins.live.session import Checkpoints, Session
 from polyins.live.sinks import Outlet, ParquetLog, open_sink
-from polyins.live.source import POLL, Source, open_source
+from polyins.live.source import POLL, Source
+from polyins.live.sources import open_source
 from polyins.live.starter import Starter
-from polyins.methods import find_method
-from polyins.recording import Recording
-from polyins.screen import compilation_said, say
+from polyins.model.methods import find_method
+from polyins.model.recording import Recording
+from polyins.navigate import modules
+from polyins.prepare.alignment import Start
+from polyins.reading import loading
+from polyins.screen import say
+from polyins.version import __version__
 
 if TYPE_CHECKING:
-    from polyins.navigator import Navigator
+    from polyins.navigate.navigator import Navigator
 
 REPLAY = "replay:"
 TOLD = 5.0  # s, at least, between two messages on what is missing for a start
@@ -83,14 +89,14 @@ def run(options: Options) -> dict[str, Any]:
     config, document, warnings = loading.read_config(options.config)
     recording, notes = _recording(options, config, document)
     method = find_method(options.method or modules.usual_method(recording.rig)).name
-    results.make_folder(options.out)
+    make_folder(options.out)
     session = _session(options, config, recording, method)
     with _stop_signals() as stopped:
         live = Live(session, _sources(options, config, recording, session), stopped)
         live.open_outlets(options, method, config)
         live.run()
     summary = live.summary(method, (*warnings, *notes))
-    results.write_document(options.out / "summary.json", summary)
+    write_document(options.out / "summary.json", summary)
     if session.navigator is None and not live.stopped_by:
         raise InputError(f"{options.config}: the data ended without a start: {session.starter.why}")
     return summary
@@ -231,7 +237,7 @@ def _recording(options: Options, config: Config, document: Document) -> tuple[Re
 
 
 def _session(options: Options, config: Config, recording: Recording, method: str) -> Session:
-    from polyins.navigator import Navigator
+    from polyins.navigate.navigator import Navigator
 
     rig, delay = recording.rig, options.delay
     latest = max(delay, options.wait)

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polyins.alignment import Start
-from polyins.io.files import write_bytes
+from polyins.files import write_bytes
 from polyins.live.events import Array, Epoch, ImuEpoch
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
 from polyins.live.starter import Starter
+from polyins.prepare.alignment import Start
 
 if TYPE_CHECKING:
-    from polyins.navigator import ImuHealth, Navigator, NavigatorState
+    from polyins.navigate.navigator import ImuHealth, Navigator, NavigatorState
 
 SILENT_GNSS = 2.0
 """s without a fix that are dead reckoning; at least, and 2.5 times the usual interval"""

@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
-from polyins import __version__
 from polyins.errors import InputError
-from polyins.io.files import whole
+from polyins.files import whole
 from polyins.live import nmea
 from polyins.live.snapshot import Snapshot, columns
 from polyins.live.source import address
+from polyins.version import __version__
 
 if TYPE_CHECKING:
     from pyarrow.parquet import ParquetWriter

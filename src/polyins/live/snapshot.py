@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.attitude import euler_angles, euler_variance
-from polyins.geodesy import displacement
+from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.geodesy import displacement
 
 if TYPE_CHECKING:
-    from polyins.navigator import NavigatorState
+    from polyins.navigate.navigator import NavigatorState
 
 Array = NDArray[np.float64]
 

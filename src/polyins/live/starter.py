@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from polyins import alignment, timesync
-from polyins.alignment import Start
 from polyins.errors import InputError
 from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch
-from polyins.recording import GnssStream, ImuStream, Recording
+from polyins.model.recording import GnssStream, ImuStream, Recording
+from polyins.prepare import alignment, timesync
+from polyins.prepare.alignment import Start
 
 EVERY = 1.0
 """s of data between two attempts"""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.attitude import euler_angles, euler_variance
+from polyins.model.attitude import euler_angles, euler_variance
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.palette import transparent

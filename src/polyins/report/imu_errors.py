@@ -7,12 +7,12 @@ from html import escape
 
 import numpy as np
 
+from polyins.model.rig import DEG, HOUR, MGAL, PPM
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.palette import imu_colours
 from polyins.report.scene import Run, Scene
 from polyins.report.style import choose, finish, mark_time, stacked
-from polyins.rig import DEG, HOUR, MGAL, PPM
 
 ROWS = ("gyro bias (deg/h)", "accel. bias (mGal)", "gyro scale (ppm)", "accel. scale (ppm)")
 UNITS = np.repeat([DEG / HOUR, MGAL, PPM, PPM], 3)

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.model.solution import Innovations
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.palette import REJECTED, transparent
 from polyins.report.scene import Run, Scene
 from polyins.report.style import choose, finish, mark_time, stacked
-from polyins.solution import Innovations
 
 Array = NDArray[np.float64]
 

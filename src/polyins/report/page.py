@@ -7,10 +7,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from polyins import __version__
 from polyins.evaluation.summary import Document
-from polyins.io.files import whole
-from polyins.recording import Recording
+from polyins.files import whole
+from polyins.model.recording import Recording
+from polyins.model.solution import Solution
 from polyins.report.drift_curves import drift_figure
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
 from polyins.report.figure import Figure, as_script
@@ -20,7 +20,7 @@ from polyins.report.outage_bars import outage_figure
 from polyins.report.scene import Scene
 from polyins.report.tables import facts, figures_table, warnings_by_text
 from polyins.report.trajectory import trajectory_figure
-from polyins.solution import Solution
+from polyins.version import __version__
 
 BANDS = "Bands are three times the standard deviation that the filter states."
 

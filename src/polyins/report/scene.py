@@ -9,14 +9,14 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.attitude import rotation_matrices
 from polyins.evaluation.errors import Errors, compare_to_reference
 from polyins.evaluation.summary import Document, on_wheels
-from polyins.geodesy import metres_per_unit
-from polyins.recording import Recording
+from polyins.model.attitude import rotation_matrices
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.recording import Recording
+from polyins.model.solution import Solution
+from polyins.prepare.timesync import GAP
 from polyins.report.palette import OUTAGE, SILENCE, method_styles
-from polyins.solution import Solution
-from polyins.timesync import GAP
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from polyins.evaluation.summary import Document, on_wheels, plain
-from polyins.recording import Recording
+from polyins.evaluation.summary import Document, on_wheels
+from polyins.formats.documents import plain
+from polyins.model.recording import Recording
 from polyins.report.scene import Run, Scene
 
 Cell = tuple[str, str]

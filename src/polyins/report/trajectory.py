@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.geodesy import displacement
+from polyins.model.geodesy import displacement
+from polyins.model.solution import Innovations
 from polyins.report.decimation import kept_for_display
 from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.palette import FIXES, OUTAGE_TRACK, REFERENCE, REJECTED
 from polyins.report.scene import Run, Scene
 from polyins.report.style import finish
-from polyins.solution import Innovations
 
 Array = NDArray[np.float64]
 

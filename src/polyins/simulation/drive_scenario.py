@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
+from polyins.checks.stream_checks import check_std, check_track
 from polyins.config import NotNegative, Number, Positive, PositiveSpread, Section
 from polyins.config.fields import blame
 from polyins.errors import InputError
-from polyins.io.checks import check_std, check_track
-from polyins.io.guess import read_stream
-from polyins.io.rows import Track
-from polyins.rig import DEG
+from polyins.formats.rows import Track
+from polyins.model.rig import DEG
+from polyins.reading.guess import read_stream
 from polyins.simulation.path import Driving, Path, World, drive
 from polyins.simulation.replay import Ride, replay
 

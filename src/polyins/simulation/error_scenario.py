@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from polyins.config import NotNegative, Number, Section, Triple
-from polyins.rig import DEG, HOUR, MGAL, ImuErrors, NoiseGrade
+from polyins.model.rig import DEG, HOUR, MGAL, ImuErrors, NoiseGrade
 from polyins.simulation.force_response import STANDARD_GRAVITY
 from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.shared_noise import SharedNoise

@@ -1,4 +1,4 @@
-"""A recording as files: one Parquet table per stream and the YAML configuration that `polyins.loading` reads back.
+"""A recording as files: one Parquet table per stream and the YAML configuration that `reading.loading` reads back.
 
 Increments are written as the recording holds them, in array axes; the configuration therefore has no mount rotations.
 """
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.io.files import whole, write_bytes
-from polyins.io.table import ATTITUDE_NAMES, GEODETIC_NAMES, LOCAL_NAMES, VELOCITY_NAMES, write_gnss, write_imu
-from polyins.io.yaml_document import write_yaml
-from polyins.recording import FilterOptions, Recording, Reference, RollingOptions, StartOptions
-from polyins.rig import DEG, HOUR, MGAL, PPM, Imu, ImuErrors, NoiseGrade, Wheel
+from polyins.config.yaml_document import write_yaml
+from polyins.files import whole, write_bytes
+from polyins.formats.table import ATTITUDE_NAMES, GEODETIC_NAMES, LOCAL_NAMES, VELOCITY_NAMES, write_gnss, write_imu
+from polyins.model.recording import FilterOptions, Recording, Reference, RollingOptions, StartOptions
+from polyins.model.rig import DEG, HOUR, MGAL, PPM, Imu, ImuErrors, NoiseGrade, Wheel
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from polyins.config import NotNegative, Number, Pair, Positive, Section, Triple
 from polyins.config.fields import blame
-from polyins.rig import DEG
+from polyins.model.rig import DEG
 from polyins.simulation.cantilever import Cantilever
 from polyins.simulation.flexible import Ruler
 from polyins.simulation.path import Path, World

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.rig import Vector, zero_vector
+from polyins.model.rig import Vector, zero_vector
 from polyins.simulation.triads import product
 
 Array = NDArray[np.float64]

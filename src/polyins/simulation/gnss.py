@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polyins.errors import InputError
-from polyins.recording import GnssStream
+from polyins.model.recording import GnssStream
 from polyins.simulation import earth
 from polyins.simulation.imu_errors import gauss_markov
 from polyins.simulation.path import Path, World

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.rig import ImuErrors, NoiseGrade, Vector
+from polyins.model.rig import ImuErrors, NoiseGrade, Vector
 from polyins.simulation.force_response import ForceResponse, draw_force_response
 from polyins.simulation.sampling import jittered, rounded
 from polyins.simulation.shared_noise import SharedNoise, blend

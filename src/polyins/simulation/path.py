@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polyins.attitude import euler_jacobian, quaternions, rotation_matrices, wrap
-from polyins.rig import DEG
+from polyins.model.attitude import euler_jacobian, quaternions, rotation_matrices, wrap
+from polyins.model.rig import DEG
 from polyins.simulation import earth
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.recording import FilterOptions
+from polyins.model.recording import FilterOptions
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polyins.errors import InputError
-from polyins.geodesy import metres_per_unit
-from polyins.rig import DEG
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.rig import DEG
 from polyins.simulation.path import Path, path
 
 if TYPE_CHECKING:

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from pathlib import Path as FilePath
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
-from polyins.io.imu_stream import noise_grade
-from polyins.io.yaml_document import write_yaml
-from polyins.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
-from polyins.rig import DEG, Imu
+from polyins.model.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
+from polyins.model.rig import DEG, Imu
+from polyins.reading.imu_stream import noise_grade
 from polyins.simulation import gnss
 from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Road
@@ -26,13 +26,11 @@ from polyins.simulation.increments import Increments, increments, stamps
 from polyins.simulation.moving_imu import FINE_STEPS, moving_increments, smooth_rates
 from polyins.simulation.path import Path
 from polyins.simulation.rolling import RollingWheel
+from polyins.simulation.scenario import Scenario, read_scenario
 from polyins.simulation.shaking import shake, shaken_path
 from polyins.simulation.shared_noise import SharedNoise
 from polyins.simulation.triads import product
 from polyins.simulation.wheels import wheel_increments
-
-if TYPE_CHECKING:
-    from polyins.simulation.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -120,6 +118,24 @@ def _on_rulers(run: TrueRun, rng: np.random.Generator) -> TrueRun:
     for imu, ruler in zip(scenario.rig().imus, rulers, strict=True):
         tips[imu.name] = moving_increments(smooth, ruler, flex(ruler, shaking, gravity), shaking)
     return replace(run, path=shaken_path(path, shaking), tips=tips)
+
+
+def simulate(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Recording:
+    """Return the recording of a scenario, or of the file that describes it; None: the default scenario.
+
+    `seed` takes the place of the scenario's. Raises InputError for a scenario that cannot be.
+    """
+    return simulate_with_truth(scenario, seed=seed).recording
+
+
+def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Simulation:
+    """Return the recording of a scenario like `simulate`, with the path and the errors behind it."""
+    if isinstance(scenario, str | FilePath):
+        scenario = read_scenario(scenario)
+    scenario = scenario or Scenario()
+    if seed is not None:
+        scenario = scenario.model_copy(update={"seed": checked(seed)})
+    return record(true_run(scenario), seed=scenario.seed)
 
 
 def record(run: TrueRun, *, seed: int) -> Simulation:

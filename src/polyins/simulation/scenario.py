@@ -27,18 +27,17 @@ from polyins.config import (
     validated,
 )
 from polyins.config.fields import blame
-from polyins.io.checks import axes_matrix
-from polyins.io.imu_stream import initial_std, noise_grade
-from polyins.io.yaml_document import read_yaml
-from polyins.recording import FilterOptions, Recording
-from polyins.rig import DEG, Imu, Rig
+from polyins.config.yaml_document import read_yaml
+from polyins.model.axes import axes_matrix
+from polyins.model.recording import FilterOptions
+from polyins.model.rig import DEG, Imu, Rig
+from polyins.reading.imu_stream import initial_std, noise_grade
 from polyins.simulation import earth
 from polyins.simulation.drive_scenario import Drive, Replay
 from polyins.simulation.error_scenario import Errors as Errors
 from polyins.simulation.flexible_scenario import Road, Rulers, Shuttle
 from polyins.simulation.path import START, World
 from polyins.simulation.plane import Plane
-from polyins.simulation.run import Simulation, checked, record, true_run
 from polyins.simulation.wheel_scenario import Laps, Track, WheelModule
 
 Array = NDArray[np.float64]
@@ -323,21 +322,3 @@ def read_scenario(path: str | FilePath) -> Scenario:
             files = {key: str(folder / FilePath(getattr(section, key)).expanduser()) for key in keys}
             located[name] = section.model_copy(update=files)
     return scenario.model_copy(update=located)
-
-
-def simulate(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Recording:
-    """Return the recording of a scenario, or of the file that describes it; None: the default scenario.
-
-    `seed` takes the place of the scenario's. Raises InputError for a scenario that cannot be.
-    """
-    return simulate_with_truth(scenario, seed=seed).recording
-
-
-def simulate_with_truth(scenario: Scenario | str | FilePath | None = None, *, seed: int | None = None) -> Simulation:
-    """Return the recording of a scenario like `simulate`, with the path and the errors behind it."""
-    if isinstance(scenario, str | FilePath):
-        scenario = read_scenario(scenario)
-    scenario = scenario or Scenario()
-    if seed is not None:
-        scenario = scenario.model_copy(update={"seed": checked(seed)})
-    return record(true_run(scenario), seed=scenario.seed)

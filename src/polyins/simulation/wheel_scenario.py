@@ -11,8 +11,8 @@ from pydantic import AfterValidator, Field, model_validator
 
 from polyins.config import NotNegative, Number, Positive, Section, Triple
 from polyins.config.fields import blame
-from polyins.io.columns import column_names, read_columns
-from polyins.rig import DEG, Imu, NoiseGrade, Wheel
+from polyins.formats.columns import column_names, read_columns
+from polyins.model.rig import DEG, Imu, NoiseGrade, Wheel
 from polyins.simulation import earth
 from polyins.simulation.laps import lap_length, lap_points, lap_speeds
 from polyins.simulation.path import Path, World

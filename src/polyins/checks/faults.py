@@ -1,0 +1,140 @@
+"""Rows that a chip did not measure: values that it repeats, rows of zeros, rates held at the end of a range.
+
+Two samples of a chip differ at least by its noise. Where all six values repeat exactly for long it has frozen. Data
+without noise, as they are simulated, repeat on any straight stretch, so nothing is concluded from those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.formats.rows import ImuRows, intervals, without
+from polyins.model.recording import Array, ImuStream
+
+LONGEST_REPEAT = 10
+"""samples; of a slower chip whose samples are written several times, so many of its own"""
+SAME = 1e-9
+"""of the largest value, rad/s or m/s^2: less is rounding, from an increment to a rate and back"""
+ROUGH = 0.5
+"""A difference over that of the order below: 1.7 and more of white noise, the turn per sample of what only turns."""
+DIGITS = 1e-6
+"""of the largest value: less is how it was written"""
+LEAST_CLIPPED = 5
+"""samples in a row at exactly the largest value"""
+LEAST_STEPS = 10.0
+"""usual steps from zero to the largest value; less is coarse resolution"""
+NAMES = ("gyro x", "gyro y", "gyro z", "accelerometer x", "accelerometer y", "accelerometer z")
+
+
+def without_faults(rows: ImuRows, name: str, clock_offset: float) -> tuple[ImuRows, tuple[str, ...]]:
+    """Leave out the rows that the chip did not measure; returns warnings that name the IMU and the spans.
+
+    `clock_offset`, s, puts the stamps in the warnings on the recording's clock.
+    """
+    if len(rows.time) < 2:
+        return rows, ()
+    time = rows.time + clock_offset
+    found = {"shows zeros only": _zeros(rows), "repeats the same values": _frozen(rows)}
+    texts = [
+        f"{rows.source.path}: IMU {name} {what} from {begin:.3f} to {end:.3f} s; left out"
+        for what, bad in found.items()
+        for begin, end in _spans(time, bad)
+    ]
+    bad = np.logical_or(*found.values())
+    return (without(rows, bad) if bad.any() else rows), tuple(texts)
+
+
+def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) -> tuple[str, ...]:
+    """Return warnings of values that stay at exactly the largest one, in sensor axes.
+
+    `gyro`: of gyros, too; not needed where their range is known.
+    """
+    rates = _rates(rows)
+    texts = []
+    for k in range(0 if gyro else 3, 6):
+        size = np.abs(rates[:, k])
+        largest = size.max()
+        runs = [run for run in _runs(size >= (1.0 - SAME) * largest) if run[1] - run[0] >= LEAST_CLIPPED]
+        if not runs:
+            continue
+        distinct = rates[np.diff(rates[:, k], prepend=np.nan) != 0.0, k]
+        if not _is_rough(distinct[:, None], 3, DIGITS * largest):
+            continue
+        if largest < LEAST_STEPS * np.median(np.abs(np.diff(distinct))):
+            continue
+        value = f"{np.degrees(largest):.4g} deg/s" if k < 3 else f"{largest:.4g} m/s^2"
+        remedy = "; gyro_range_deg_s leaves such rows out" if k < 3 else ""
+        texts.append(
+            f"{rows.source.path}: {NAMES[k]} of IMU {name} stays at exactly {value}, its largest value, "
+            f"{len(runs)} time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its "
+            f"range?{remedy}"
+        )
+    return tuple(texts)
+
+
+def check_alive(streams: Sequence[ImuStream]) -> None:
+    """Raise InputError if one IMU shows the same values throughout and another one does not."""
+    spread = [np.ptp(np.hstack([stream.dtheta, stream.dvel]), axis=0).max() for stream in streams]
+    dead = int(np.argmin(spread))
+    if spread[dead] == 0.0 < max(spread):
+        raise InputError(f"IMU {streams[dead].name}: shows the same values throughout; expected one that measures")
+
+
+def _rates(rows: ImuRows) -> Array:
+    return np.hstack([rows.dtheta, rows.dvel]) / intervals(rows.time)[:, None]
+
+
+def _zeros(rows: ImuRows) -> NDArray[np.bool_]:
+    """Return which rows are zero throughout, which no accelerometer on earth shows; the first begins no interval."""
+    zero = np.asarray((np.hstack([rows.dtheta, rows.dvel]) == 0.0).all(axis=1))
+    zero[0] = False
+    return zero if not zero[1:].all() else np.zeros_like(zero)
+
+
+def _frozen(rows: ImuRows) -> NDArray[np.bool_]:
+    """Return which rows repeat those before them for longer than a chip's own samples do."""
+    rates = _rates(rows)
+    equal = (np.diff(rows.dtheta, axis=0) == 0.0).all(axis=1) & (np.diff(rows.dvel, axis=0) == 0.0).all(axis=1)
+    first = _changes(rates)
+    first[1:] &= ~equal
+    frozen = np.zeros(len(first), dtype=bool)
+    begins = np.flatnonzero(first)
+    lengths = np.diff(begins, append=len(first))
+    long = np.flatnonzero(lengths > LONGEST_REPEAT * np.median(lengths))
+    if not long.size or not _is_rough(rates[first], 1, SAME * float(np.abs(rates).max())):
+        return frozen
+    for k in long:
+        frozen[begins[k] + 1 : begins[k] + lengths[k]] = True
+    return frozen
+
+
+def _changes(rates: Array) -> NDArray[np.bool_]:
+    """Return which rows differ from the one before, shape (T,)."""
+    largest = np.repeat([max(1.0, float(np.abs(part).max())) for part in np.hsplit(rates, 2)], 3)
+    moved = np.abs(np.diff(rates, axis=0)) > SAME * largest
+    return np.concatenate([[True], moved.any(axis=1)])
+
+
+def _is_rough(distinct: Array, order: int, least: float) -> bool:
+    """Return whether any channel has noise, from rows that all differ, by its differences of that order and the next.
+
+    Motion makes less of higher ones, the digits that a file has make more.
+    """
+    if len(distinct) < order + 2:
+        return False
+    lower, higher = (np.median(np.abs(np.diff(distinct, n, axis=0)), axis=0) for n in (order, order + 1))
+    return bool(np.any((lower > least) & (higher > ROUGH * lower)))
+
+
+def _runs(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first row and the one after the last of each stretch in which `where` holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
+    return [(int(begin), int(end)) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _spans(time: Array, bad: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    return [(float(time[max(begin - 1, 0)]), float(time[end - 1])) for begin, end in _runs(bad)]

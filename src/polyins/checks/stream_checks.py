@@ -1,0 +1,274 @@
+"""What is looked for in data before anything is computed from them: order, gaps, units, axes, plausible values.
+
+A check raises InputError or returns warnings; the thresholds stand at the top.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from polyins.errors import InputError
+from polyins.formats.rows import ImuRows, Source, Track
+from polyins.model.axes import axes_matrix, right_handed_axes
+from polyins.model.recording import Array, usual_interval
+from polyins.prepare.timesync import common_end
+
+Axes = tuple[str, str, str]
+
+GRAVITY_M_S2 = (5.0, 15.0)
+"""The median size of the specific force lies between these on any vehicle."""
+STANDARD_GRAVITY = 9.80665
+MAX_TURN_RAD = 2.0
+MAX_RATE_RAD_S = 10.0
+"""rms over a recording, of anything but a wheel"""
+UNUSUAL_RATE_RAD_S = 3.0
+WHEEL_RATE_RAD_S = 100.0
+"""rms over a recording, of a wheel"""
+FARTHEST_OFF_AXIS_M = 1.0
+"""what a sensor of unknown mount may be off the axis of a wheel"""
+RATES_HZ = (5.0, 20000.0)
+GAP_INTERVALS = 1.5
+"""A longer step means that rows are missing, which is a warning. Where one or two are, the rate of the row after the
+step is taken for all of it; from `timesync.GAP` intervals on a gap is bridged."""
+JITTER = 0.2
+UPRIGHT = 0.5
+"""Cosine of the largest angle between up in the array and the mean specific force."""
+MIN_COMMON_S = 2.0
+MAX_STD_M = 10000.0
+
+
+def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m: float = 0.0) -> tuple[str, ...]:
+    """Check one IMU's rows, in the sensor's axes, and return warnings.
+
+    `max_rate_rad_s`: rms turn rate allowed; `off_axis_m`: how far from the axis of its turning it may sit, on a wheel.
+
+    Raises InputError for fewer than two rows, NaN, stamps that do not increase, and values whose size shows a wrong
+    unit.
+    """
+    if len(rows.time) < 2:
+        raise InputError(f"{rows.source.path}: {len(rows.time)} row(s); expected at least 2")
+    check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel})
+    check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
+    _check_rate(rows)
+    _check_accel_unit(rows, off_axis_m)
+    rate = _check_gyro_unit(rows, max_rate_rad_s)
+    texts = _uneven(rows.time)
+    if rate > UNUSUAL_RATE_RAD_S and max_rate_rad_s <= MAX_RATE_RAD_S:
+        texts.append(f"turns at {rate:.3g} rad/s (rms), which is unusual; is the gyro's unit {rows.gyro_unit}?")
+    return (*rows.warnings, *(f"{rows.source.path}: {text}" for text in texts))
+
+
+def check_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> None:
+    """Raise InputError if the mean specific force in array axes does not point up, with axes that would make it so.
+
+    `dvel`: m/s in array axes (forward, right, down), shape (T, 3); `axes` as configured.
+    """
+    force = dvel[1:].sum(axis=0) / (time[-1] - time[0])
+    if -force[2] >= UPRIGHT * np.linalg.norm(force):
+        return
+    raise InputError(
+        f"{place}: IMU {name}: with axes [{', '.join(axes)}] the mean specific force is "
+        f"[{', '.join(f'{f:.1f}' for f in force)}] m/s^2 forward, right, down; expected about [0, 0, -9.8]. "
+        f"Try axes: [{', '.join(upright_axes(axes, force))}]"
+    )
+
+
+def upright_axes(axes: Axes, force: Array) -> Axes:
+    """Return right-handed axes that make the mean specific force point up, as near to `axes` as there are.
+
+    `force`: the mean specific force in array axes as they are now, shape (3,).
+    """
+    now = axes_matrix(axes)
+    sensor_force = now.T @ force
+
+    def rating(proposal: Axes) -> float:
+        matrix = axes_matrix(proposal)
+        # The forward axis is the one to keep, then the right one; both weigh less than any change of what is up.
+        kept = (now * matrix).sum(axis=1) @ [0.02, 0.01, 0.0]
+        return float(kept - (matrix @ sensor_force)[2] / np.linalg.norm(force))
+
+    return max(right_handed_axes(), key=rating)
+
+
+def check_track(track: Track, what: str) -> tuple[str, ...]:
+    """Check positions of GNSS or a reference and return warnings.
+
+    Raises InputError for no rows, NaN, stamps that do not increase, coordinates that no place on Earth has.
+    """
+    if not len(track.time):
+        raise InputError(f"{track.source.path}: no rows; expected positions for {what}")
+    check_finite(track.source, {"time": track.time, "position": track.position})
+    angles = track.attitude
+    if angles is not None and np.isnan(angles[:, :2]).all():  # of a reference with heading alone
+        angles = angles[:, 2:]
+    optional = {"velocity": track.velocity, "velocity std": track.velocity_std, "attitude": angles}
+    check_finite(track.source, {name: block for name, block in optional.items() if block is not None})
+    check_order(track.source, track.time)
+    if track.geodetic:
+        _check_coordinates(track)
+    return track.warnings
+
+
+def check_std(source: Source, std: Array) -> None:
+    """Raise InputError for standard deviations of a position that are not positive metres."""
+    check_finite(source, {"position std": std})
+    for row in np.flatnonzero((std <= 0.0).any(axis=1))[:1]:
+        raise InputError(
+            f"{source.place(int(row))}: position std is {std[row].tolist()} m; expected numbers above zero "
+            "(position_std_m in the configuration takes their place)"
+        )
+    for row in np.flatnonzero((std > MAX_STD_M).any(axis=1))[:1]:
+        raise InputError(f"{source.place(int(row))}: position std is {std[row].tolist()} m; expected metres")
+
+
+def check_common_span(spans: dict[str, tuple[float, float]]) -> tuple[float, float]:
+    """Return the span of the recording, s; raise InputError if all IMUs have less than 2 s in common.
+
+    It begins when all measure. One that stops long before the others does not end it.
+    """
+    latest = max(spans, key=lambda name: spans[name][0])
+    earliest = min(spans, key=lambda name: spans[name][1])
+    begin, end = spans[latest][0], spans[earliest][1]
+    if end - begin >= MIN_COMMON_S:
+        return begin, common_end(np.array([span[1] for span in spans.values()]))
+    if latest == earliest:
+        raise InputError(f"IMU {latest}: {end - begin:.3f} s of data; expected at least {MIN_COMMON_S:g} s")
+    raise InputError(
+        f"IMU {latest} begins at {begin:.3f} s and IMU {earliest} ends at {end:.3f} s; expected at least "
+        f"{MIN_COMMON_S:g} s in common (clock_offset_s shifts a clock)"
+    )
+
+
+def check_within(source: Source, what: str, time: Array, span: tuple[float, float]) -> tuple[str, ...]:
+    """Return a warning if part of a stream lies outside the IMUs' span; raise InputError if all of it does."""
+    inside = (time >= span[0]) & (time <= span[1])
+    if not inside.any():
+        raise InputError(
+            f"{source.path}: {what} covers {time[0]:.3f} to {time[-1]:.3f} s, the IMUs {span[0]:.3f} to "
+            f"{span[1]:.3f} s; expected the same clock (clock_offset_s shifts it; GPS time is 18 s ahead of UTC)"
+        )
+    if inside.all():
+        return ()
+    count = int(np.sum(~inside))
+    return (f"{source.path}: {count} of {len(time)} {what} rows lie outside the IMUs' span and are not used",)
+
+
+def check_finite(source: Source, blocks: dict[str, Array], first_row: int = 0) -> None:
+    """Raise InputError for the first row, in blocks of shape (T,) or (T, k) by name, that is not all numbers.
+
+    `first_row`: of the blocks in the file.
+    """
+    for name, block in blocks.items():
+        good = np.isfinite(block)
+        if good.all():
+            continue
+        bad = ~good
+        for row in np.flatnonzero(bad if block.ndim == 1 else bad.any(axis=1))[:1]:
+            place = source.place(first_row + int(row))
+            raise InputError(f"{place}: {name} is missing or not a number; expected a number")
+
+
+def check_order(source: Source, time: Array, remedy: str = "", first_row: int = 0) -> None:
+    """Raise InputError for stamps, shape (T,), that do not increase; `remedy` ends the message."""
+    steps = np.diff(time)
+    if np.all(steps > 0.0):
+        return
+    row = int(np.argmax(steps <= 0.0)) + 1
+    place = source.place(first_row + row)
+    if steps[row - 1] == 0.0:
+        count = int(np.sum(steps == 0.0))
+        raise InputError(
+            f"{place}: time {time[row]:.6f} s is repeated ({count} in the file); expected increasing times{remedy}"
+        )
+    raise InputError(
+        f"{place}: time {time[row]:.6f} s follows {time[row - 1]:.6f} s; expected increasing times{remedy}"
+    )
+
+
+def _check_rate(rows: ImuRows) -> None:
+    rate = 1.0 / usual_interval(rows.time)
+    if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
+        raise InputError(
+            f"{rows.source.path}: {rate:.4g} rows per second of the stamps; expected {RATES_HZ[0]:g} to "
+            f"{RATES_HZ[1]:g} for an IMU: is the unit of time (s, ms, us, ns) right?"
+        )
+
+
+def _check_accel_unit(rows: ImuRows, off_axis_m: float) -> None:
+    step = usual_interval(rows.time)
+    size = float(np.median(_sizes(rows.dvel))) / step
+    spin = float(np.median(_sizes(rows.dtheta))) / step if off_axis_m else 0.0
+    if GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1] + off_axis_m * spin**2:
+        return
+    unit, said = rows.accel_unit, f"the specific force comes out at {size:.4g} m/s^2"
+    if unit == "m/s" and _like_gravity(size * step):
+        hint = "values look like rates; say unit: m/s^2 (format: table)"
+    elif unit == "m/s" and _like_gravity(size * step * STANDARD_GRAVITY):
+        hint = "values look like rates in g; say unit: g (format: table)"
+    elif unit == "m/s^2" and _like_gravity(size / step):
+        hint = "values look like increments; say unit: m/s"
+    elif unit == "m/s^2" and _like_gravity(size * STANDARD_GRAVITY):
+        hint = "values look like multiples of g; say unit: g"
+    elif unit == "g" and _like_gravity(size / STANDARD_GRAVITY):
+        hint = "values look like m/s^2; say unit: m/s^2"
+    else:
+        hint = "unit, rate or columns are wrong, or gravity was taken out"
+    raise InputError(f"{rows.source.path}: with unit {unit} {said}; expected about 9.8. {hint}")
+
+
+def _sizes(vectors: Array) -> Array:
+    """Return the length of each vector of shape (T, 3)."""
+    x, y, z = vectors.T
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
+def _like_gravity(size: float) -> bool:
+    return GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1]
+
+
+def _check_gyro_unit(rows: ImuRows, max_rate: float) -> float:
+    """Return the rms turn rate, rad/s."""
+    turn = _sizes(rows.dtheta[1:])
+    rms = float(np.sqrt(np.mean((turn / np.diff(rows.time)) ** 2)))
+    largest = int(np.argmax(turn))
+    on_wheel = max_rate > MAX_RATE_RAD_S
+    if (on_wheel or turn[largest] <= MAX_TURN_RAD) and rms <= max_rate:
+        return rms
+    other = {"rad/s": "deg/s", "rad": "rad/s or deg/s", "deg": "deg/s", "deg/s": "another"}[rows.gyro_unit]
+    raise InputError(
+        f"{rows.source.place(largest + 1)}: with unit {rows.gyro_unit} the turn in one interval is "
+        f"{turn[largest]:.3g} rad (rms rate {rms:.3g} rad/s); expected at most {MAX_TURN_RAD:g} rad and "
+        f"{max_rate:g} rad/s: is the unit {other}?{'' if on_wheel else ' (On a wheel, it needs the section wheel.)'}"
+    )
+
+
+def _check_coordinates(track: Track) -> None:
+    latitude, longitude = track.position[:, 0], track.position[:, 1]
+    wrong = (np.abs(latitude) > np.pi / 2) | (np.abs(longitude) > 2 * np.pi)
+    empty = (latitude == 0.0) & (longitude == 0.0)
+    for row in np.flatnonzero(wrong)[:1]:
+        hint = ": are the values degrees?" if track.angle_unit == "rad" else ": are the columns in this order?"
+        raise InputError(
+            f"{track.source.place(int(row))}: latitude {np.degrees(latitude[row]):.6g} deg, longitude "
+            f"{np.degrees(longitude[row]):.6g} deg; expected at most 90 and 360{hint}"
+        )
+    for row in np.flatnonzero(empty)[:1]:
+        raise InputError(f"{track.source.place(int(row))}: latitude and longitude are 0; expected rows with a fix only")
+
+
+def _uneven(time: Array) -> list[str]:
+    """Describe gaps and jitter of a stream."""
+    steps = np.diff(time)
+    usual = usual_interval(time)
+    gaps = steps > GAP_INTERVALS * usual
+    texts = []
+    if gaps.any():
+        worst = int(np.argmax(steps))
+        texts.append(
+            f"{int(gaps.sum())} gap(s) in the stamps, the largest {steps[worst]:.4g} s at {time[worst]:.3f} s; "
+            "the motion inside is not known"
+        )
+    spread = float(np.quantile(np.abs(steps[~gaps] - usual), 0.95)) / usual
+    if spread > JITTER:
+        texts.append(f"intervals vary by {100 * spread:.0f} % (95 % of them by less); expected an even rate")
+    return texts

@@ -1,0 +1,195 @@
+"""Named columns of a table, CSV or Parquet, as arrays of numbers."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polyins.errors import InputError
+from polyins.files import find, read_bytes, read_head
+from polyins.formats.arrow_arrays import to_numpy
+from polyins.formats.rows import Source
+from polyins.model.recording import Array
+
+Column = str | int
+"""A column's name, or its number counted from 1."""
+
+PARQUET_MAGIC = b"PAR1"
+HEAD_BYTES = 16384
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text table is built."""
+
+    delimiter: str
+    names: tuple[str, ...]
+    first_line: int
+    """line of the first row, counted from 1"""
+
+
+def column_names(path: str | Path) -> tuple[str, ...]:
+    """Return the names of all columns; those of a file without a header are empty."""
+    content = read_bytes(path)
+    return _parquet_names(path, content) if content[:4] == PARQUET_MAGIC else layout(path, content).names
+
+
+def read_columns(
+    path: str | Path, wanted: Sequence[Column], *, header_has: str = "", text_is_nan: bool = False
+) -> tuple[Source, list[Array]]:
+    """Read the wanted columns, each of shape (T,); what is missing in a cell is NaN.
+
+    `header_has`: a name by which the header line is known where other lines come before it. `text_is_nan`: cells that
+    are not numbers are NaN instead of an error. Raises InputError that names the missing column or the bad line.
+    """
+    if find(path).suffix != ".gz" and read_head(path, 4) == PARQUET_MAGIC:
+        return Source(str(find(path))), _parquet_columns(path, wanted)
+    content = read_bytes(path)
+    if content[:4] == PARQUET_MAGIC:
+        return Source(str(find(path))), _parquet_columns(path, wanted, content)
+    table = layout(path, content, header_has)
+    if not content.isascii():
+        content = content.decode(errors="replace").encode()
+    if table.delimiter == " ":
+        content = re.sub(rb"(?m)^[ \t]+|[ \t]+$", b"", content)
+        content = re.sub(rb"[ \t]+", b" ", content)
+    places = [_place(find(path), table.names, column) for column in wanted]
+    return Source(str(find(path)), table.first_line), _text_columns(find(path), content, table, places, text_is_nan)
+
+
+def layout(path: str | Path, content: bytes, header_has: str = "") -> Layout:
+    """Find delimiter, header and first row of a text table."""
+    lines = content[:HEAD_BYTES].decode("utf-8-sig", errors="replace").splitlines()
+    start = next((n for n, line in enumerate(lines) if header_has in line and not _is_preamble(line)), None)
+    if start is None:
+        raise InputError(f"{find(path)}: no line of column names with {header_has}; expected such a header")
+    first = lines[start]
+    delimiter = next((mark for mark in (",", ";", "\t") if mark in first), " ")
+    fields = _split(first, delimiter)
+    if any(_is_number(text) for text in fields):
+        commented = _split(lines[start - 1].lstrip("#% "), delimiter) if start else []
+        names = commented if len(commented) == len(fields) else [""] * len(fields)
+        return Layout(delimiter, tuple(names), start + 1)
+    if start + 1 >= len(lines):
+        raise InputError(f"{find(path)}: has a header and no rows; expected data")
+    extra = len(_split(lines[start + 1], delimiter)) - len(fields)
+    return Layout(delimiter, tuple(fields + [""] * max(extra, 0)), start + 2)
+
+
+def _is_preamble(line: str) -> bool:
+    return not line.strip() or line.startswith(("#", "%", "sep="))
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    return [text.strip().strip('"') for text in (line.split(delimiter) if delimiter != " " else line.split())]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _place(path: Path, names: Sequence[str], column: Column) -> int:
+    """Return where a column stands, from 0."""
+    if isinstance(column, int):
+        if not 1 <= column <= len(names):
+            raise InputError(f"{path}: no column {column}; expected a number from 1 to {len(names)}")
+        return column - 1
+    if column not in names:
+        present = [name for name in names if name]
+        near = difflib.get_close_matches(column, present, n=1, cutoff=0.4)
+        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(present) or '1, 2, ...'}"
+        raise InputError(f"{path}: no column {column!r}; {hint}")
+    return names.index(column)
+
+
+def _text_columns(path: Path, content: bytes, table: Layout, places: list[int], text_is_nan: bool) -> list[Array]:
+    from pyarrow import ArrowInvalid, float64
+
+    try:
+        columns = _parse(path, content, table, places, float64())
+    except ArrowInvalid:
+        from pyarrow import binary
+
+        cells = _parse(path, content, table, places, binary())
+        return [_numbers(path, table, place, column, text_is_nan) for place, column in zip(places, cells, strict=True)]
+    return [to_numpy(column) for column in columns]
+
+
+def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: Any) -> list[Any]:
+    """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them."""
+    from pyarrow import ArrowInvalid, BufferReader, csv
+
+    def refuse(row: Any) -> str:
+        bad.append(f"{path}, line {row.number}: {row.actual_columns} columns; expected {row.expected_columns}")
+        return "error"
+
+    bad: list[str] = []
+    names = [str(number) for number in range(len(table.names))]
+    wanted = [str(place) for place in places]
+    try:
+        parsed = csv.read_csv(
+            BufferReader(content),
+            csv.ReadOptions(column_names=names, skip_rows=table.first_line - 1, use_threads=False),
+            csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=refuse),
+            csv.ConvertOptions(
+                include_columns=sorted(set(wanted)),
+                column_types=dict.fromkeys(wanted, kind),
+                strings_can_be_null=False,
+            ),
+        )
+    except ArrowInvalid as error:
+        if bad:
+            raise InputError(bad[0]) from error
+        raise
+    return [parsed[name] for name in wanted]
+
+
+def _numbers(path: Path, table: Layout, place: int, cells: Any, text_is_nan: bool) -> Array:
+    """Convert cell by cell, to find the one that is not a number."""
+    values = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells.to_pylist()):
+        text = cell.decode(errors="replace")
+        if _is_number(text):
+            values[row] = float(text)
+        elif text.strip() and not text_is_nan:
+            name = table.names[place] or f"column {place + 1}"
+            raise InputError(f"{path}, line {table.first_line + row}: {name} is {text!r}; expected a number")
+    return values
+
+
+def parquet_places(path: str | Path, wanted: Sequence[Column], content: bytes | None = None) -> list[str]:
+    """Return the names of the wanted columns of a Parquet file; raise InputError for one that is missing."""
+    names = _parquet_names(path, content)
+    return [names[_place(Path(path), names, column)] for column in wanted]
+
+
+def _parquet_names(path: str | Path, content: bytes | None = None) -> tuple[str, ...]:
+    from pyarrow import ArrowException, BufferReader, parquet
+
+    try:
+        return tuple(parquet.read_schema(find(path) if content is None else BufferReader(content)).names)
+    except (ArrowException, OSError) as error:
+        raise InputError(f"{find(path)}: is not a whole Parquet file ({str(error).splitlines()[0]})") from error
+
+
+def _parquet_columns(path: str | Path, wanted: Sequence[Column], content: bytes | None = None) -> list[Array]:
+    """Read columns from a file, or from its content where that is unpacked."""
+    from pyarrow import ArrowException, BufferReader, float64, parquet
+
+    chosen = parquet_places(find(path), wanted, content)
+    try:
+        source = find(path) if content is None else BufferReader(content)
+        table = parquet.ParquetFile(source, pre_buffer=False).read(chosen, use_threads=False)
+        return [to_numpy(table[name].cast(float64(), safe=False)) for name in chosen]
+    except (ArrowException, OSError) as error:
+        raise InputError(f"{find(path)}: cannot be read as numbers ({str(error).splitlines()[0]})") from error

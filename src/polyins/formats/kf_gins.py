@@ -1,0 +1,182 @@
+"""The data files of KF-GINS: IMU increments (text and binary), GNSS positions, navigation results.
+
+Columns as that program documents them. Angles are degrees in files and radians in memory.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from polyins.errors import InputError
+from polyins.files import find, read_bytes, write_bytes
+from polyins.formats.arrow_arrays import to_numpy
+from polyins.formats.rows import ImuRows, Source, Track, intervals
+from polyins.model.recording import Array, GnssStream, ImuStream
+from polyins.model.rig import DEG
+
+IMU_COLUMNS = 7
+ROW_BYTES = 8 * IMU_COLUMNS
+IMU_FORMATS = ("%.9f", *6 * ["%.12e"])
+
+
+def read_imu(path: str | Path) -> ImuRows:
+    """Read IMU increments: s, 3 angle increments (rad), 3 velocity increments (m/s); text or little-endian doubles.
+
+    Which of the two it is shows in the content. Raises InputError for a wrong number of columns, a value that is not
+    a number, or a binary file that ends within a row.
+    """
+    content = read_bytes(path)
+    text = is_text(content)
+    rows = _numbers(path, content, {IMU_COLUMNS: "s, 3 rad, 3 m/s"}) if text else _binary(path, content)
+    return ImuRows(Source(str(find(path)), 1 if text else None), rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+
+
+def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
+    """Read the IMU file of Wheel-INS: s, 3 rates (rad/s), 3 specific forces (m/s^2) in little-endian doubles.
+
+    Increments are rate x interval, as in that program; with `rate_hz` the stamps are ignored. Raises InputError for
+    text and for a file that ends within a row.
+    """
+    content = read_bytes(path)
+    if is_text(content):
+        raise InputError(f"{find(path)}: is text; expected rows of {IMU_COLUMNS} doubles (s, 3 rad/s, 3 m/s^2)")
+    rows = _binary(path, content)
+    time = np.arange(len(rows)) / rate_hz if rate_hz else rows[:, 0]
+    increments = rows[:, 1:] * intervals(time)[:, None]
+    source = Source(str(find(path)))
+    return ImuRows(source, time, increments[:, :3], increments[:, 3:], gyro_unit="rad/s", accel_unit="m/s^2")
+
+
+def read_gnss(path: str | Path) -> Track:
+    """Read positions: s, latitude, longitude (deg), height (m), std north, east, down (m).
+
+    With 13 columns the velocity (north, east, down, m/s) stands before the position's std and its std after it.
+    """
+    wanted = {
+        7: "s, latitude deg, longitude deg, height m, std m",
+        13: "the same with velocity and its std",
+    }
+    rows = _numbers(path, read_bytes(path), wanted)
+    source = Source(str(find(path)), 1)
+    if rows.shape[1] == 7:
+        return Track(source, rows[:, 0], _radians(rows[:, 1:4], 2), position_std=rows[:, 4:7])
+    return Track(
+        source,
+        rows[:, 0],
+        _radians(rows[:, 1:4], 2),
+        position_std=rows[:, 7:10],
+        velocity=rows[:, 4:7],
+        velocity_std=rows[:, 10:13],
+    )
+
+
+def read_nav(path: str | Path) -> Track:
+    """Read a navigation result or truth: week, s, latitude, longitude (deg), height (m), velocity NED, angles (deg)."""
+    rows = _numbers(path, read_bytes(path), {11: "week, s, lat, lon, h, vN, vE, vD, roll, pitch, heading"})
+    return Track(
+        Source(str(find(path)), 1),
+        rows[:, 1],
+        _radians(rows[:, 2:5], 2),
+        velocity=rows[:, 5:8],
+        attitude=rows[:, 8:11] * DEG,
+    )
+
+
+def write_imu_text(path: str | Path, stream: ImuStream) -> None:
+    """Write increments as KF-GINS text."""
+    _write_text(path, np.column_stack([stream.time, stream.dtheta, stream.dvel]), IMU_FORMATS)
+
+
+def write_imu_binary(path: str | Path, stream: ImuStream) -> None:
+    """Write increments as KF-GINS binary: 7 little-endian doubles per row."""
+    write_bytes(path, np.column_stack([stream.time, stream.dtheta, stream.dvel]).astype("<f8").tobytes())
+
+
+def write_gnss(path: str | Path, stream: GnssStream) -> None:
+    """Write geodetic positions as a KF-GINS GNSS file, of 13 columns where the stream has velocities."""
+    position = stream.position.copy()
+    position[:, :2] /= DEG
+    columns = [stream.time, position, stream.position_std]
+    formats = ["%.9f", "%.12f", "%.12f", "%.6f", *3 * ["%.6f"]]
+    if stream.velocity is not None and stream.velocity_std is not None:
+        columns = [stream.time, position, stream.velocity, stream.position_std, stream.velocity_std]
+        formats += 6 * ["%.6f"]
+    _write_text(path, np.column_stack(columns), formats)
+
+
+def is_text(content: bytes) -> bool:
+    """Tell text, of whatever encoding, from binary by the first bytes: it has no control characters but blanks."""
+    return all(byte in b"\t\n\r\f" or byte >= 32 for byte in content[:512])
+
+
+def _radians(rows: Array, columns: int) -> Array:
+    rows = rows.copy()
+    rows[:, :columns] *= DEG
+    return rows
+
+
+def _binary(path: str | Path, content: bytes) -> Array:
+    if len(content) % ROW_BYTES:
+        raise InputError(
+            f"{find(path)}: {len(content)} bytes, the last row is cut off; expected a multiple of {ROW_BYTES} "
+            f"({IMU_COLUMNS} doubles a row)"
+        )
+    return np.frombuffer(content, "<f8").reshape(-1, IMU_COLUMNS).astype(float)
+
+
+def _numbers(path: str | Path, content: bytes, wanted: dict[int, str]) -> Array:
+    """Parse rows of numbers between blanks or commas and check how many columns there are."""
+    if b"," in content[:4096]:
+        content = content.replace(b",", b" ")
+    rows = _evenly_spaced(content)
+    if rows is None:
+        try:
+            rows = np.loadtxt(content.splitlines(), ndmin=2, comments=None)
+        except ValueError as error:
+            raise _bad_line(find(path), content) from error
+    if rows.shape[1] not in wanted:
+        expected = " or ".join(f"{count} ({names})" for count, names in wanted.items())
+        raise InputError(f"{find(path)}: {rows.shape[1]} columns; expected {expected}")
+    return rows
+
+
+def _evenly_spaced(content: bytes) -> Array | None:
+    """Return the numbers of lines in which one blank stands between any two; None of any other file, or a wrong one."""
+    from pyarrow import ArrowInvalid, BufferReader, csv, float64
+
+    if content.startswith(b" ") or any(mark in content for mark in (b"  ", b"\n ", b" \n", b" \r", b'"')):
+        return None
+    names = [str(k) for k in range(len(content[: content.find(b"\n")].split()))]
+    try:
+        table = csv.read_csv(
+            BufferReader(content),
+            csv.ReadOptions(column_names=names, use_threads=False),
+            csv.ParseOptions(delimiter=" "),
+            csv.ConvertOptions(column_types=dict.fromkeys(names, float64()), null_values=[]),
+        )
+    except ArrowInvalid:
+        return None
+    return np.column_stack([to_numpy(column) for column in table.columns])
+
+
+def _bad_line(path: Path, content: bytes) -> InputError:
+    """Find the line that is to blame: the first that is not numbers, or not as many as the first line has."""
+    width = 0
+    for number, line in enumerate(content.splitlines(), 1):
+        fields = line.split()
+        for text in fields:
+            try:
+                float(text)
+            except ValueError:
+                return InputError(f"{path}, line {number}: {text.decode(errors='replace')!r}; expected a number")
+        width = width or len(fields)
+        if fields and len(fields) != width:
+            return InputError(f"{path}, line {number}: {len(fields)} columns; expected {width} as in the lines before")
+    return InputError(f"{path}: cannot be read as rows of numbers")
+
+
+def _write_text(path: str | Path, rows: Array, formats: list[str] | tuple[str, ...]) -> None:
+    line = " ".join(formats)
+    write_bytes(path, ("\n".join(line % tuple(row) for row in rows.tolist()) + "\n").encode())

@@ -1,0 +1,103 @@
+"""What every reader returns: rows in the sensor's own axes and on its own clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.model.recording import Array, usual_interval
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where rows came from, so that a message can name the line."""
+
+    path: str
+    first_line: int | None = None
+    """line of the first row, counted from 1; None: the file has no lines"""
+
+    def place(self, row: int) -> str:
+        """Name a row (counted from 0) as a user finds it: by line in a text file, else by row."""
+        if self.first_line is None:
+            return f"{self.path}, row {row + 1}"
+        return f"{self.path}, line {self.first_line + row}"
+
+
+@dataclass(frozen=True)
+class ImuRows:
+    """Increments over the interval that ends at the stamp, in sensor axes."""
+
+    source: Source
+    time: Array
+    """s, shape (T,)"""
+    dtheta: Array
+    """rad, shape (T, 3)"""
+    dvel: Array
+    """m/s, shape (T, 3)"""
+    gyro_unit: str = "rad"
+    """the unit in the file: rad or deg are increments, rad/s or deg/s rates"""
+    accel_unit: str = "m/s"
+    """m/s is increments, m/s^2 or g rates"""
+    gyro_range_deg_s: float | None = None
+    """full scale, where the format is that of one sensor"""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Track:
+    """Positions, and what else a receiver or a reference system gives."""
+
+    source: Source
+    time: Array
+    """s, shape (M,)"""
+    position: Array
+    """(latitude rad, longitude rad, height m) or (north m, east m, height m), shape (M, 3)"""
+    geodetic: bool = True
+    above_sea: bool = False
+    """heights are above the sea (geoid), not above the ellipsoid"""
+    position_std: Array | None = None
+    """m north, east, down, shape (M, 3)"""
+    velocity: Array | None = None
+    """m/s north, east, down, shape (M, 3)"""
+    velocity_std: Array | None = None
+    """m/s, shape (M, 3)"""
+    attitude: Array | None = None
+    """roll, pitch, heading, rad, shape (M, 3)"""
+    angle_unit: str = "deg"
+    """the unit of latitude and longitude in the file"""
+    quality: dict[str, int] = field(default_factory=dict)
+    """how many fixes of each kind the receiver reports"""
+    warnings: tuple[str, ...] = ()
+
+    def at_rows(self, rows: NDArray[np.intp]) -> Track:
+        """Return the track with just those rows; messages then name rows, not lines."""
+        blocks = ("position_std", "velocity", "velocity_std", "attitude")
+        given = {name: block[rows] for name in blocks if (block := getattr(self, name)) is not None}
+        source = Source(self.source.path)
+        return replace(self, source=source, time=self.time[rows], position=self.position[rows], **given)
+
+
+LONGEST_BRIDGE = 3
+"""Rows in a row that can be left out while the one after them stands for their time as well."""
+
+
+def without(rows: ImuRows, bad: NDArray[np.bool_]) -> ImuRows:
+    """Leave out the rows in `bad`, shape (T,).
+
+    After a hole of up to 3 rows the next row's rates are taken for the whole time since the row before the hole; longer
+    holes are gaps.
+    """
+    kept = np.flatnonzero(~bad)
+    holes = np.diff(kept, prepend=kept[:1] - 1) - 1
+    bridged = (holes > 0) & (holes <= LONGEST_BRIDGE) & (np.arange(len(kept)) > 0)
+    own, time = intervals(rows.time)[kept], rows.time[kept]
+    factor = np.where(bridged, intervals(time) / own, 1.0)[:, None]
+    return replace(rows, time=time, dtheta=rows.dtheta[kept] * factor, dvel=rows.dvel[kept] * factor)
+
+
+def intervals(time: Array) -> Array:
+    """Return the length of the interval that ends at each stamp, s; the first is taken to be the usual one."""
+    steps = np.diff(time)
+    return np.concatenate([[usual_interval(time)], steps]) if len(steps) else np.zeros(len(time))

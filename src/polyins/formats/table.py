@@ -1,0 +1,230 @@
+"""Tables, CSV or Parquet, whose columns and units the configuration declares; and the tables that polyins writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polyins.errors import InputError
+from polyins.files import plain_suffix, write_bytes
+from polyins.formats.arrow_arrays import to_arrow
+from polyins.formats.columns import Column, column_names, read_columns
+from polyins.formats.rows import ImuRows, Source, Track, intervals
+from polyins.model.recording import Array, GnssStream, ImuStream
+from polyins.model.rig import DEG
+
+if TYPE_CHECKING:
+    from polyins.config import ImuColumns, TrackColumns
+
+STANDARD_GRAVITY = 9.80665
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+RADIANS = {"rad/s": 1.0, "rad": 1.0, "deg/s": DEG, "deg": DEG}
+METRES = {"m/s^2": 1.0, "m/s": 1.0, "g": STANDARD_GRAVITY}
+
+IMU_NAMES = ("time_s", *(f"dtheta_{axis}_rad" for axis in "xyz"), *(f"dvel_{axis}_m_s" for axis in "xyz"))
+GEODETIC_NAMES = ("latitude_deg", "longitude_deg", "height_m")
+LOCAL_NAMES = ("north_m", "east_m", "down_m")
+STD_NAMES = ("std_north_m", "std_east_m", "std_down_m")
+VELOCITY_NAMES = ("north_velocity_m_s", "east_velocity_m_s", "down_velocity_m_s")
+VELOCITY_STD_NAMES = ("std_north_velocity_m_s", "std_east_velocity_m_s", "std_down_velocity_m_s")
+ATTITUDE_NAMES = ("roll_deg", "pitch_deg", "heading_deg")
+
+
+def read_imu(path: str | Path, columns: ImuColumns | None = None, rate_hz: float | None = None) -> ImuRows:
+    """Read the IMU table whose columns are declared, or one that polyins wrote.
+
+    Rates become increments by the length of the interval that ends at the stamp; with `rate_hz` the time is row number
+    / rate and the stamps are ignored. Raises InputError for missing columns and cells that are not numbers.
+    """
+    if columns is None:
+        columns = written_imu_columns()
+    if columns.time is None and rate_hz is None:
+        raise InputError(f"{path}: neither columns.time nor rate_hz is given; expected one of them")
+    source, values = read_columns(path, imu_cells(columns, rate_hz))
+    return imu_rows(source, values, columns, rate_hz)
+
+
+def written_imu_columns() -> ImuColumns:
+    """Return the columns of an IMU table that polyins wrote."""
+    from polyins.config import ImuColumns
+
+    gyro = {"names": IMU_NAMES[1:4], "unit": "rad"}
+    accel = {"names": IMU_NAMES[4:7], "unit": "m/s"}
+    return ImuColumns.model_validate({"time": {"name": IMU_NAMES[0]}, "gyro": gyro, "accel": accel})
+
+
+def imu_cells(columns: ImuColumns, rate_hz: float | None = None) -> list[Column]:
+    """Return which columns of an IMU table are read: gyro, accelerometer, and the stamps unless `rate_hz` is given."""
+    stamp: list[Column] = [] if rate_hz or columns.time is None else [columns.time.name]
+    return [*columns.gyro.names, *columns.accel.names, *stamp]
+
+
+def imu_rows(source: Source, values: Sequence[Array], columns: ImuColumns, rate_hz: float | None = None) -> ImuRows:
+    """Return the rows of an IMU table from the values of `imu_cells`, each of shape (T,)."""
+    if rate_hz or columns.time is None:
+        time = np.arange(len(values[0])) / (rate_hz or 1.0)
+    else:
+        time = values[6] * SECONDS[columns.time.unit]
+    gyro, accel = columns.gyro.unit, columns.accel.unit
+    dtheta = _increments(values[:3], RADIANS[gyro], time if gyro.endswith("/s") else None)
+    dvel = _increments(values[3:6], METRES[accel], None if accel == "m/s" else time)
+    return ImuRows(source, time, dtheta, dvel, gyro_unit=gyro, accel_unit=accel)
+
+
+def _increments(values: Sequence[Array], unit: float, time: Array | None) -> Array:
+    """Return three columns in SI, shape (T, 3), times the intervals of `time` where they are rates."""
+    rows = np.column_stack(values)
+    if unit != 1.0:
+        rows *= unit
+    if time is not None:
+        rows *= intervals(time)[:, None]
+    return rows
+
+
+def read_track(path: str | Path, columns: TrackColumns | None = None) -> Track:
+    """Read positions, and velocity, attitude and standard deviations where declared.
+
+    Without `columns` the table has the names that polyins writes (also those of solution.parquet).
+    """
+    if columns is None:
+        columns = written_columns(path)
+    groups = {
+        "position": columns.position,
+        "std": columns.std,
+        "velocity": columns.velocity,
+        "velocity_std": columns.velocity_std,
+        "attitude": columns.attitude,
+    }
+    given = {name: group for name, group in groups.items() if group is not None}
+    wanted: list[Column] = [name for group in given.values() for name in group.names]
+    named = (columns.time, columns.heading)
+    single: list[Column | None] = [None if group is None else group.name for group in named] + [columns.valid]
+    source, values = read_columns(path, [*wanted, *(column for column in single if column is not None)])
+    found = {name: np.column_stack(values[3 * n : 3 * n + 3]) for n, name in enumerate(given)}
+    rest = iter(values[len(wanted) :])
+    time, heading, valid = (None if column is None else next(rest) for column in single)
+    track = _track(source, _stamps(time, columns, len(values[0])), found, columns)
+    if heading is not None and columns.heading is not None:
+        unknown = np.full((len(heading), 2), np.nan)
+        track = replace(track, attitude=np.column_stack([unknown, heading * RADIANS[columns.heading.unit]]))
+    return _used(track, columns, valid)
+
+
+def _stamps(time: Array | None, columns: TrackColumns, rows: int) -> Array:
+    if time is not None and columns.time is not None:
+        return time * SECONDS[columns.time.unit]
+    assert columns.rows is not None
+    return np.arange(rows) / columns.rows.rate_hz
+
+
+def _used(track: Track, columns: TrackColumns, valid: Array | None) -> Track:
+    """Leave out the rows that are not to be used; the source then names rows instead of lines."""
+    kept = np.arange(len(track.time))
+    if columns.rows is not None:
+        kept = kept[columns.rows.first - 1 :: columns.rows.every]
+    if valid is not None:
+        kept = kept[valid[kept] != 0.0]
+    return track if len(kept) == len(track.time) else track.at_rows(kept)
+
+
+def written_columns(path: str | Path) -> TrackColumns:
+    """Return the columns of a table of positions that polyins wrote."""
+    from polyins.config import TrackColumns
+
+    names = set(column_names(path))
+    geodetic = names.issuperset(GEODETIC_NAMES) and not np.isnan(read_columns(path, GEODETIC_NAMES[:1])[1][0]).all()
+    declared: dict[str, object] = {
+        "time": {"name": "time_s"},
+        "position": {"names": GEODETIC_NAMES if geodetic else LOCAL_NAMES}
+        | ({} if geodetic else {"frame": "north-east-down"}),
+    }
+    for group, columns in (
+        ("std", STD_NAMES),
+        ("velocity", VELOCITY_NAMES),
+        ("velocity_std", VELOCITY_STD_NAMES),
+        ("attitude", ATTITUDE_NAMES),
+    ):
+        if names.issuperset(columns):
+            declared[group] = {"names": columns}
+    return TrackColumns.model_validate(declared)
+
+
+def write_imu(path: str | Path, stream: ImuStream) -> None:
+    """Write increments as CSV or Parquet, by the suffix."""
+    _write(path, IMU_NAMES, [stream.time, stream.dtheta, stream.dvel])
+
+
+def write_gnss(path: str | Path, stream: GnssStream, *, geodetic: bool) -> None:
+    """Write fixes with their standard deviations as CSV or Parquet, by the suffix."""
+    track = Track(
+        Source(str(path)),
+        stream.time,
+        stream.position,
+        geodetic,
+        position_std=stream.position_std,
+        velocity=stream.velocity,
+        velocity_std=stream.velocity_std,
+    )
+    write_track(path, track)
+
+
+def write_track(path: str | Path, track: Track) -> None:
+    """Write positions, and what else there is with them, as CSV or Parquet, by the suffix."""
+    units = np.array([DEG, DEG, 1.0] if track.geodetic else [1.0, 1.0, -1.0])
+    names = ["time_s", *(GEODETIC_NAMES if track.geodetic else LOCAL_NAMES)]
+    values = [track.time, track.position / units]
+    for extra, block, unit in (
+        (STD_NAMES, track.position_std, 1.0),
+        (VELOCITY_NAMES, track.velocity, 1.0),
+        (VELOCITY_STD_NAMES, track.velocity_std, 1.0),
+        (ATTITUDE_NAMES, track.attitude, DEG),
+    ):
+        if block is not None:
+            names += extra
+            values.append(block / unit)
+    _write(path, names, values)
+
+
+def _track(source: Source, time: Array, found: dict[str, Array], columns: TrackColumns) -> Track:
+    frame = columns.position.frame
+    geodetic = frame == "latitude-longitude-height"
+    vectors = columns.velocity.frame if columns.velocity else "north-east-down"
+    angle_unit = columns.position.unit or "deg"
+    scale = [RADIANS[angle_unit], RADIANS[angle_unit], 1.0] if geodetic else 1.0
+    up_to_down = [1.0, 1.0, -1.0]
+    return Track(
+        source,
+        time,
+        _north_east_up(found["position"], frame) * scale,
+        geodetic=geodetic,
+        position_std=_north_east_first(found["std"], frame) if "std" in found else None,
+        velocity=_north_east_up(found["velocity"], vectors) * up_to_down if "velocity" in found else None,
+        velocity_std=_north_east_first(found["velocity_std"], vectors) if "velocity_std" in found else None,
+        attitude=found["attitude"] * RADIANS[columns.attitude.unit] if columns.attitude else None,
+        angle_unit=angle_unit,
+    )
+
+
+def _north_east_up(values: Array, frame: str) -> Array:
+    """Bring three components given in `frame` into the order north, east, up; geodetic ones are in order."""
+    return _north_east_first(values, frame) * [1.0, 1.0, -1.0 if frame == "north-east-down" else 1.0]
+
+
+def _north_east_first(values: Array, frame: str) -> Array:
+    """Bring three magnitudes given in `frame` into the order north, east, vertical."""
+    return values[:, [1, 0, 2]] if frame == "east-north-up" else values
+
+
+def _write(path: str | Path, names: Sequence[str], values: Sequence[Array]) -> None:
+    from pyarrow import BufferOutputStream, csv, parquet
+    from pyarrow import table as arrow_table
+
+    rows = np.column_stack(values)
+    table = arrow_table({name: to_arrow(rows[:, n]) for n, name in enumerate(names)})
+    content = BufferOutputStream()
+    (parquet.write_table if plain_suffix(path) == ".parquet" else csv.write_csv)(table, content)
+    write_bytes(path, content.getvalue().to_pybytes())

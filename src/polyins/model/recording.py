@@ -1,0 +1,185 @@
+"""Time-stamped streams and what belongs to them: the input of every method.
+
+A position is (latitude rad, longitude rad, ellipsoidal height m) where the recording is geodetic, and
+(north m, east m, height m) on a local tangent plane where it is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.model.rig import Rig, Vector, zero_vector
+
+Array = NDArray[np.float64]
+
+
+USUAL_OF = 10_000
+"""Intervals that tell the usual one, however long the recording is."""
+
+
+def usual_interval(time: Array) -> float:
+    """Return the median of the first intervals between stamps, shape (T,), s."""
+    return float(np.median(np.diff(time[: USUAL_OF + 1])))
+
+
+@dataclass(frozen=True)
+class ImuStream:
+    """Increments of one IMU in array axes, each over the interval that ends at its time stamp."""
+
+    name: str
+    time: Array
+    """s, shape (T,), strictly increasing"""
+    dtheta: Array
+    """rad, shape (T, 3)"""
+    dvel: Array
+    """m/s, shape (T, 3)"""
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate: one over the median interval."""
+        return float(1.0 / np.median(np.diff(self.time)))
+
+
+@dataclass(frozen=True)
+class GnssStream:
+    """Positions, and where the receiver gives them velocities, of the antenna."""
+
+    time: Array
+    """s, shape (M,)"""
+    position: Array
+    """shape (M, 3), see the module's docstring"""
+    position_std: Array
+    """m north, east, down, shape (M, 3)"""
+    velocity: Array | None = None
+    """m/s north, east, down, shape (M, 3)"""
+    velocity_std: Array | None = None
+    """m/s, shape (M, 3)"""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the solution is judged by; what the reference system does not give is None."""
+
+    time: Array
+    """s, shape (R,)"""
+    position: Array
+    """shape (R, 3), see the module's docstring"""
+    velocity: Array | None = None
+    """m/s north, east, down, shape (R, 3)"""
+    attitude: Array | None = None
+    """roll, pitch, heading, rad, shape (R, 3)"""
+    lever_arm: Vector = field(default_factory=zero_vector)
+    """The reference's point in the array frame, m."""
+
+
+@dataclass(frozen=True)
+class StartOptions:
+    """How the navigation state is found at the start; what is None is found from the data."""
+
+    time: float | None = None
+    """s; None: the first instant at which all that is needed is there"""
+    end_time: float | None = None
+    """s; None: the end of the data"""
+    position: Vector | None = None
+    """of the array origin, see the module's docstring"""
+    velocity: Vector | None = None
+    """m/s north, east, down"""
+    roll_pitch: Array | None = None
+    """rad, shape (2,)"""
+    heading: float | None = None
+    """rad"""
+    heading_from: str = "auto"
+    """value, gnss-course, reference, or auto: the first of these that the data allow"""
+    static_interval: tuple[float, float] | None = None
+    """s, s: the array stands still; None: looked for"""
+    position_std: Vector | None = None
+    """m north, east, down"""
+    velocity_std: Vector | None = None
+    """m/s"""
+    attitude_std: Vector | None = None
+    """rad: roll, pitch, heading"""
+    estimate_gyro_bias: bool = True
+    """use a static interval for the gyro biases of IMUs"""
+
+
+@dataclass(frozen=True)
+class RollingOptions:
+    """How wheels aid the filter; the values are paper B's (Table IX)."""
+
+    speed_interval: float = 0.5
+    """s, from one update by wheel speed and nonholonomic constraint to the next"""
+    speed_window: float = 0.1
+    """s: the speed is the mean over this time before the update"""
+    predict: str = "window"
+    """what the measured mean speed is compared with: the mean velocity over the same window, or with "end" the velocity
+    at its end, which is half a window late"""
+    wheel_speed_std: Vector = field(default_factory=lambda: np.array([0.03, 0.02, 0.02]))
+    """m/s forward, right, down, for IMUs on wheels"""
+    body_speed_std: Vector = field(default_factory=lambda: np.array([0.05, 0.04, 0.04]))
+    """m/s forward, right, down, for IMUs on the body"""
+    constraint_interval: float = 1.0
+    """s, from one update by the reference point to the next"""
+    constraint_std: float = 0.2
+    """m, of each component of the reference point"""
+    standstill: bool = True
+    """look for standstills and update by zero velocity and zero rate there"""
+
+
+@dataclass(frozen=True)
+class FilterOptions:
+    """What the filter is told beyond the rig."""
+
+    gate_limit: float | None = 100.0
+    """A fix is rejected whose normalized innovation squared, with the prediction's std taken `engine.CAUTION`-fold,
+    exceeds this; None: no gate. Errors beyond the model, such as misaligned chips', make good fixes exceed ten of the
+    filter's own sigma after an outage or in a bend, but not ten of four times these."""
+    gate_reopen_after: int = 3
+    """After that many rejections in a row the next fix is believed and the covariance grows to match."""
+    gnss_snap: float = 1e-4
+    """s: a fix nearer than this to an IMU epoch is applied at that epoch; otherwise the interval is split."""
+    gravity: float = 9.80665
+    """m/s^2, on a local tangent plane only."""
+    rolling: RollingOptions = RollingOptions()
+
+
+@dataclass(frozen=True)
+class Offset:
+    """What was found to add to the stamps of one stream to put them on the clock of the others."""
+
+    name: str
+    """of the IMU, or GNSS"""
+    offset_s: float
+    std_s: float
+    correlation: float
+    """of the motions that were compared, at that offset"""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Everything that a method needs: the rig, the streams on one clock, how to start, what to leave out."""
+
+    rig: Rig
+    imus: tuple[ImuStream, ...]
+    """in the order of `rig.imus`"""
+    gnss: GnssStream | None = None
+    reference: Reference | None = None
+    geodetic: bool = True
+    outages: tuple[tuple[float, float], ...] = ()
+    """s, s: intervals in which GNSS is withheld from the filter"""
+    start: StartOptions = StartOptions()
+    options: FilterOptions = FilterOptions()
+    name: str = "recording"
+    config_text: str = ""
+    """the configuration in force, as YAML"""
+    warnings: tuple[str, ...] = ()
+    clock_offsets: tuple[Offset, ...] = ()
+    """what was found where the configuration says `time_offset: estimate`"""
+
+    def subset(self, indices: Iterable[int]) -> Recording:
+        """Return the recording with just the IMUs of those indices."""
+        kept = tuple(indices)
+        return replace(self, rig=self.rig.subset(kept), imus=tuple(self.imus[i] for i in kept))

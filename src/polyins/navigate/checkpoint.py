@@ -1,0 +1,97 @@
+"""A navigator in a file: what it was made of as JSON, what it remembers as arrays.
+
+The numbers are those of the memory, so that a navigator which goes on from the file gives what it would have given.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import typing
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.files import write_bytes
+from polyins.model.recording import FilterOptions
+from polyins.model.rig import Rig
+from polyins.prepare.alignment import Start
+from polyins.prepare.assembly import Assembly, Epoch
+from polyins.version import __version__
+
+if TYPE_CHECKING:
+    from cattrs import Converter
+
+    from polyins.navigate.timeline import Timeline
+
+Arrays = dict[str, NDArray[Any]]
+
+MADE, SAMPLES, LINE = "made", "samples.", "line."
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a navigator is made of."""
+
+    polyins: str
+    """version"""
+    rig: Rig
+    start: Start
+    method: str
+    options: FilterOptions
+    geodetic: bool
+    imu: int
+    delay: float
+    wait: float
+    counts: dict[str, int]
+    first: Epoch | None
+    """of which the run begins, as long as there is only one"""
+    early: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]]
+
+
+def write(path: Path, made: Made, assembly: Assembly, timeline: Timeline | None) -> None:
+    """Write a navigator to a file, which is whole or absent."""
+    text = json.dumps(_converter().unstructure(made))
+    arrays: Arrays = {MADE: np.frombuffer(text.encode(), dtype=np.uint8)}
+    arrays |= {SAMPLES + name: array for name, array in assembly.arrays().items()}
+    if timeline is not None:
+        arrays |= {LINE + name: array for name, array in timeline.arrays().items()}
+    content = io.BytesIO()
+    np.savez(content, allow_pickle=False, **arrays)
+    write_bytes(path, content.getvalue())
+
+
+def read(path: Path) -> tuple[Made, Arrays, Arrays]:
+    """Return what `write` was given, the last two as arrays; raise InputError for any other file."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays: Arrays = dict(file)
+        values = json.loads(arrays.pop(MADE).tobytes())
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: is no checkpoint ({error}); expected a file that a navigator saved") from error
+    if values["polyins"] != __version__:
+        raise InputError(f"{path}: of polyins {values['polyins']}; expected one of {__version__}")
+    return _converter().structure(values, Made), _named(SAMPLES, arrays), _named(LINE, arrays)
+
+
+def _named(prefix: str, arrays: Arrays) -> Arrays:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def _converter() -> Converter:
+    """Return what turns dataclasses with arrays into JSON's values and back, each number exactly."""
+    from cattrs import Converter
+
+    converter = Converter()
+    converter.register_unstructure_hook_func(_is_array, lambda array: array.tolist())
+    converter.register_structure_hook_func(_is_array, lambda value, _: np.array(value))
+    return converter
+
+
+def _is_array(kind: object) -> bool:
+    return kind is np.ndarray or typing.get_origin(kind) is np.ndarray

@@ -1,0 +1,350 @@
+"""The live front of the engine: IMU samples and GNSS fixes as they come, the state at any time.
+
+A recording that is played through it gives the solution of a batch run, bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polyins.errors import InputError
+from polyins.model.methods import find_method
+from polyins.model.recording import FilterOptions, Recording
+from polyins.model.rig import Rig
+from polyins.navigate import batch, checkpoint, modules
+from polyins.navigate.checkpoint import Made
+from polyins.navigate.timeline import Timeline
+from polyins.prepare.alignment import Start
+from polyins.prepare.assembly import DUPLICATED, FUTURE_STAMPED, LATE, Assembly, Epoch
+from polyins.prepare.timesync import Aligned
+from polyins.version import __version__
+
+Array = NDArray[np.float64]
+
+NOT_FINITE, BEFORE_START, NO_STD = "not finite", "before the start", "std not positive"
+NO_FIX = -1.0
+"""Variance of a velocity that is not there."""
+HEALTH_WINDOW = 1.0  # s
+
+
+@dataclass(frozen=True)
+class NavigatorState:
+    """What is known at the newest epoch."""
+
+    time: float
+    """s"""
+    position: Array
+    """(latitude rad, longitude rad, height m), or (north m, east m, height m) on a local plane, shape (3,)"""
+    velocity: Array
+    """m/s north, east, down, shape (3,)"""
+    attitude: Array
+    """q_nb, scalar first, shape (4,)"""
+    position_std: Array
+    """m north, east, down, shape (3,)"""
+    velocity_std: Array
+    """m/s, shape (3,)"""
+    phi_covariance: Array
+    """rad^2: NN, NE, ND, EE, ED, DD of the attitude error phi, shape (6,)"""
+
+    @property
+    def euler(self) -> Array:
+        """Roll, pitch and heading, rad, shape (3,)."""
+        from polyins.model.attitude import euler_angles
+
+        return np.asarray(euler_angles(self.attitude[None])[0])
+
+    @property
+    def attitude_std(self) -> Array:
+        """Standard deviations of roll, pitch and heading, rad, shape (3,)."""
+        from polyins.model.attitude import euler_variance
+
+        return np.asarray(np.sqrt(euler_variance(self.euler[None], self.phi_covariance[None])[0]))
+
+
+@dataclass(frozen=True)
+class ImuHealth:
+    """How one IMU does."""
+
+    name: str
+    last_time: float | None
+    """s, of its newest sample"""
+    rate_hz: float | None
+    silent: bool
+    """nothing came from it for the newest epoch"""
+    gyro_residual: float | None
+    """rad/s, rms over the last second and the axes of its difference from the mean of all that are there; None on a rig
+    with wheels, whose IMUs turn differently"""
+    accel_residual: float | None
+    """m/s^2, likewise"""
+
+
+class Navigator:
+    """Navigates with the IMUs of a rig from a known start.
+
+    `method` and `options` are those of a batch run; `imu` is the index of the IMU that `single` uses. `delay`: how late
+    a fix may come, s. `wait`: how long, in time of the data, an epoch waits for a sample that is missing, s; samples of
+    several IMUs may arrive in any order within it. The gyros of the IMUs need not be synchronised: epochs are those of
+    the first IMU. Raises InputError for a method that the rig has not the IMUs for.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        start: Start,
+        *,
+        method: str = "enav-fusion",
+        options: FilterOptions | None = None,
+        geodetic: bool = True,
+        imu: int = 0,
+        delay: float = 1.0,
+        wait: float = 0.05,
+    ) -> None:
+        self.method = find_method(method)
+        self._taken = batch.taken(self.method, rig, imu)
+        if len(start.imu_errors) != len(rig.imus):
+            raise InputError(f"start: errors of {len(start.imu_errors)} IMUs; expected those of {len(rig.imus)}")
+        options = options or FilterOptions()
+        self._made = Made(__version__, rig, start, method, options, geodetic, imu, delay, wait, {}, None, [])
+        rig, self.start, self.delay = rig.subset(self._taken), start.subset(self._taken), delay
+        self._recording = Recording(rig, (), geodetic=geodetic, options=options)
+        self._imus = len(start.imu_errors)
+        self._takes_some = self._taken != list(range(self._imus))
+        self._place = {index: place for place, index in enumerate(self._taken)}
+        self._modules = modules.choose(self.method, rig) if self.method.rolling else None
+        self._order = slice(None) if self._modules is None else np.array(modules.lanes(self._modules)[1])
+        self._assembly = Assembly(len(rig.imus), wait, bridge=not self.method.rolling)
+        self._timeline: Timeline | None = None
+        self._first: Epoch | None = None
+        self._early: list[tuple[float, Array, Array]] = []
+        """fixes that came before the first epoch"""
+        self.counts: dict[str, int] = {}
+        """what was refused, by kind"""
+
+    def imu(self, time: float, dtheta: ArrayLike, dvel: ArrayLike, imu: int | None = None) -> None:
+        """Take what IMU `imu` of the rig measured in the interval that ends at `time`, s: rad and m/s, shape (3,).
+
+        In array axes: a rotated mount is the caller's. Without `imu`, samples of all IMUs with one stamp, shape (N, 3).
+        A sample that cannot be taken is counted in `counts`. Raises InputError for samples of another number of IMUs.
+        """
+        if imu is None:
+            self._all(time, np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64).reshape(-1, 6))
+            return
+        values = np.empty(6)
+        values[:3], values[3:] = dtheta, dvel
+        if not _finite(time, values):
+            self._refuse(NOT_FINITE)
+        elif imu in self._place:
+            refused = self._assembly.add(self._place[imu], time, values)
+            if refused:
+                self._refuse(refused)
+            self._step()
+
+    def gnss(
+        self,
+        time: float,
+        position: ArrayLike,
+        position_std: ArrayLike,
+        velocity: ArrayLike | None = None,
+        velocity_std: ArrayLike | None = None,
+    ) -> None:
+        """Take a fix of the antenna: position as in `polyins.model.recording`, its std m; velocity and its std, m/s.
+
+        It may come `delay` seconds late and is applied at its own time all the same. A fix that cannot be taken is
+        counted in `counts`.
+        """
+        fix = np.concatenate([position, np.square(position_std)], dtype=np.float64)
+        row = np.full(6, NO_FIX)
+        if velocity is not None and velocity_std is not None:
+            row = np.concatenate([velocity, np.square(velocity_std)], dtype=np.float64)
+        if not math.isfinite(fix.sum() + row.sum() + time):
+            self._refuse(NOT_FINITE)
+        elif not (fix[3:] > 0.0).all():
+            self._refuse(NO_STD)
+        elif time > self._assembly.newest + self.delay:
+            self._refuse(FUTURE_STAMPED)
+        elif self._timeline is None:
+            self._early.append((time, fix, row))
+        else:
+            self._refuse(self._aid(self._timeline, time, fix, row))
+
+    def flush(self) -> None:
+        """Take everything that still waits: there are no more data."""
+        self._step(at_end=True)
+
+    @property
+    def state(self) -> NavigatorState | None:
+        """The state at the newest epoch; None before the first."""
+        line = self._timeline
+        return None if line is None else _state(line, line.last)
+
+    def history(self, after: float = -math.inf) -> list[NavigatorState]:
+        """Return the states of all epochs later than `after`, s, as far back as a fix may still come."""
+        line = self._timeline
+        if line is None:
+            return []
+        begun = 1 if line.whole else 0
+        first = int(np.searchsorted(line.inputs.time[: line.last + 1], after, side="right"))
+        return [_state(line, k) for k in range(max(first, begun), line.last + 1)]
+
+    @property
+    def health(self) -> tuple[ImuHealth, ...]:
+        """How each IMU that navigates does."""
+        assembly, line = self._assembly, self._timeline
+        gyro = accel = np.full(len(self._taken), math.nan)
+        if line is not None and self._modules is None:
+            gyro, accel = _residuals(line)
+        return tuple(
+            ImuHealth(
+                name=imu.name,
+                last_time=_or_none(assembly.ends[i]),
+                rate_hz=_or_none(1.0 / assembly.nominal[i]),
+                silent=bool(assembly.silent[i]),
+                gyro_residual=_or_none(gyro[i]),
+                accel_residual=_or_none(accel[i]),
+            )
+            for i, imu in enumerate(self._recording.rig.imus)
+        )
+
+    def save(self, path: Path | str) -> None:
+        """Write everything to a file from which `resume` goes on as if nothing had happened."""
+        made = replace(self._made, counts=self.counts, first=self._first, early=self._early)
+        checkpoint.write(Path(path), made, self._assembly, self._timeline)
+
+    @classmethod
+    def resume(cls, path: Path | str) -> Navigator:
+        """Return the navigator that was saved; raise InputError for a file that is not whole or of another version."""
+        made, samples, line = checkpoint.read(Path(path))
+        navigator = cls(
+            made.rig,
+            made.start,
+            method=made.method,
+            options=made.options,
+            geodetic=made.geodetic,
+            imu=made.imu,
+            delay=made.delay,
+            wait=made.wait,
+        )
+        navigator.counts, navigator._first, navigator._early = made.counts, made.first, made.early
+        navigator._assembly.restore(samples)
+        if line:
+            navigator._timeline = navigator._new_timeline(np.array([0.0, 1.0]), np.zeros((2, 6, len(navigator._taken))))
+            navigator._timeline.restore(line)
+        return navigator
+
+    def _refuse(self, why: str) -> None:
+        if why:
+            self.counts[why] = self.counts.get(why, 0) + 1
+
+    def _all(self, time: float, values: Array) -> None:
+        if len(values) != self._imus:
+            raise InputError(f"imu: increments of {len(values)} IMUs; expected those of {self._imus}")
+        if self._takes_some:
+            values = values[self._taken]
+        if not _finite(time, values.ravel()):
+            self._refuse(NOT_FINITE)
+            return
+        epoch = self._assembly.pass_through(time, values)
+        if epoch is not None:
+            self._take(epoch)
+            return
+        for i, row in enumerate(values):
+            self._refuse(self._assembly.add(i, time, row))
+        self._step()
+
+    def _step(self, at_end: bool = False) -> None:
+        for epoch in self._assembly.epochs(at_end):
+            self._take(epoch)
+
+    def _take(self, epoch: Epoch) -> None:
+        if self._timeline is not None:
+            epoch = self._completed(epoch, self._timeline)
+            self._timeline.append(epoch.time, epoch.increments[:, self._order], *self._wheels(epoch))
+        elif self._first is not None:
+            self._begin(self._first, epoch)
+        elif epoch.time >= self.start.time:
+            self._first = epoch
+
+    def _new_timeline(self, time: Array, increments: Array) -> Timeline:
+        """Lay the method out for its first two epochs."""
+        aligned = Aligned(time, increments, (), np.zeros((len(time), len(self._taken)), dtype=bool))
+        return Timeline(batch.lay_out(self.method, self._recording, aligned, self.start), self.delay)
+
+    def _begin(self, first: Epoch, second: Epoch) -> None:
+        increments = np.array([first.increments, second.increments])
+        self._timeline = self._new_timeline(np.array([first.time, second.time]), increments)
+        self._first = None
+        early, self._early = self._early, []
+        for time, fix, velocity in early:
+            self._refuse(self._aid(self._timeline, time, fix, velocity))
+        self._take(second)
+
+    def _aid(self, line: Timeline, time: float, fix: Array, velocity: Array) -> str:
+        if line.has_fix(time):
+            return DUPLICATED
+        if line.insert(time, fix, velocity):
+            return ""
+        return BEFORE_START if line.whole else LATE
+
+    def _completed(self, epoch: Epoch, line: Timeline) -> Epoch:
+        """Give chips that are silent what the others of their module measure."""
+        if self._modules is None or not epoch.missing.any():
+            return epoch
+        increments, missing = modules.completed(
+            self._modules,
+            self._recording.rig.imus,
+            epoch.increments[None],
+            np.array([epoch.time - line.time]),
+            epoch.missing[None],
+            self.start.imu_errors,
+        )
+        return Epoch(epoch.time, increments[0], missing[0])
+
+    def _wheels(self, epoch: Epoch) -> tuple[Array, NDArray[np.bool_]] | tuple[()]:
+        """Return what the wheels rolled in an epoch, and which modules have data."""
+        if self._modules is None:
+            return ()
+        line = self._timeline
+        assert line is not None
+        interval = np.array([epoch.time - line.time])
+        missing = epoch.missing[None]
+        travel = modules.travel(
+            self._modules, self._recording.rig, epoch.increments[None], interval, missing, self.start.imu_errors[:, :3]
+        )
+        return travel[0], modules.present(self._modules, missing)[0]
+
+
+def _state(line: Timeline, k: int) -> NavigatorState:
+    row, variances = line.outputs.states[k].copy(), line.outputs.variances[k].copy()
+    return NavigatorState(
+        time=float(line.inputs.time[k]),
+        position=row[0:3],
+        velocity=row[3:6],
+        attitude=row[6:10],
+        position_std=np.sqrt(variances[0:3]),
+        velocity_std=np.sqrt(variances[3:6]),
+        phi_covariance=variances[6:12],
+    )
+
+
+def _finite(time: float, values: Array) -> bool:
+    # of all sums the fastest: what is not finite does not cancel
+    return math.isfinite(values.dot(values) + time)
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _residuals(line: Timeline) -> tuple[Array, Array]:
+    """Return how far each IMU is from the mean of all, rms over the last second: rad/s and m/s^2, (N,) each."""
+    first = int(np.searchsorted(line.inputs.time[: line.last + 1], line.time - HEALTH_WINDOW)) + 1
+    here = slice(min(first, line.last), line.last + 1)
+    interval = np.diff(line.inputs.time[here.start - 1 : here.stop])
+    rates = line.inputs.increments[here] / interval[:, None, None]
+    squares = np.mean((rates - rates.mean(axis=2, keepdims=True)) ** 2, axis=0)
+    return np.sqrt(squares[:3].mean(axis=0)), np.sqrt(squares[3:].mean(axis=0))

@@ -1,0 +1,576 @@
+"""How a run starts: levelling, gyro biases, heading, velocity and position, from what is given and what is recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polyins.errors import InputError
+from polyins.kernels import earth
+from polyins.model.attitude import euler_angles, in_succession, of_rotation_vectors, quaternions, rotation_matrices
+from polyins.model.geodesy import metres_per_unit
+from polyins.model.recording import GnssStream, Recording, StartOptions
+from polyins.model.rig import DEG, Rig
+from polyins.prepare.timesync import Aligned
+
+Array = NDArray[np.float64]
+
+WINDOW = 1.0  # s
+STILL_RATE = 0.4 * DEG  # rad/s, of the averaged gyro within a window
+STILL_FORCE = 0.10  # m/s^2
+SHORTEST_STANDSTILL = 3.0  # s
+LONGEST_STANDSTILL = 60.0  # s
+FARTHEST_START = 10e3  # m from GNSS: farther away it is another place
+LEAST_LEFT = 1.0  # s, of data after the start
+COURSE_SPEED = 1.5  # m/s: slower than this the direction of motion is no heading
+AROUND = 5  # fixes: their median outvotes one that lies, and the two differences in which it shows
+HARDEST = 5.0  # m/s^2: what a vehicle accelerates by at most, for seconds
+
+
+@dataclass(frozen=True)
+class Start:
+    """The navigation state of the array origin at the first epoch, how sure it is, and where it came from."""
+
+    time: float
+    """s"""
+    position: Array
+    """see polyins.model.recording"""
+    velocity: Array
+    """m/s north, east, down"""
+    attitude: Array
+    """roll, pitch, heading, rad"""
+    position_std: Array
+    """m"""
+    velocity_std: Array
+    """m/s"""
+    attitude_std: Array
+    """rad, of phi about north, east, down"""
+    imu_errors: Array
+    """shape (N, 12)"""
+    imu_error_std: Array
+    """shape (N, 12)"""
+    sources: dict[str, str]
+    """what was used for each of them, in words"""
+    imu_attitudes: Array | None = None
+    """roll, pitch, heading of each IMU of a rig with wheels, rad, shape (N, 3)"""
+
+    @classmethod
+    def known(
+        cls,
+        rig: Rig,
+        time: float,
+        position: ArrayLike,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        attitude: ArrayLike = (0.0, 0.0, 0.0),
+        *,
+        position_std: ArrayLike = 0.1,
+        velocity_std: ArrayLike = 0.1,
+        attitude_std: ArrayLike = (0.5 * DEG, 0.5 * DEG, 2.0 * DEG),
+    ) -> Start:
+        """Return a start of an array that is known otherwise; units as above, a std is one number or one per axis."""
+
+        def vector(value: ArrayLike) -> Array:
+            return np.broadcast_to(np.asarray(value, dtype=float), (3,)).copy()
+
+        return cls(
+            time,
+            vector(position),
+            vector(velocity),
+            vector(attitude),
+            vector(position_std),
+            vector(velocity_std),
+            vector(attitude_std),
+            imu_errors=np.array([imu.initial_errors.as_array() for imu in rig.imus]),
+            imu_error_std=np.array([imu.start_std() for imu in rig.imus]),
+            sources={},
+        )
+
+    def subset(self, indices: list[int]) -> Start:
+        """Return the start of just the IMUs of those indices."""
+        attitudes = None if self.imu_attitudes is None else self.imu_attitudes[indices]
+        return replace(
+            self,
+            imu_errors=self.imu_errors[indices],
+            imu_error_std=self.imu_error_std[indices],
+            imu_attitudes=attitudes,
+        )
+
+
+def find_start(recording: Recording, aligned: Aligned) -> Start:
+    """Find the start of a recording whose IMUs are on one time base; raise InputError where nothing gives it."""
+    search = _RollingSearch if recording.rig.rolling else _Search
+    return search(recording, aligned).run()
+
+
+class _Search:
+    """One start being found; each step fills in what the steps after it need."""
+
+    def __init__(self, recording: Recording, aligned: Aligned) -> None:
+        self.recording = recording
+        self.options: StartOptions = recording.start
+        self.aligned = aligned
+        self.sources: dict[str, str] = {}
+        self.measured: dict[tuple[float, float], tuple[Array, float]] = {}
+        self.errors = np.array([imu.initial_errors.as_array() for imu in recording.rig.imus])
+        self.error_std = np.array([imu.start_std() for imu in recording.rig.imus])
+        self.fixes = velocities_from_positions(recording.gnss, recording.geodetic) if recording.gnss else None
+        # differences at the first two fixes are one-sided, in velocity or in the acceleration that follows from it
+        given = recording.gnss is not None and recording.gnss.velocity is not None
+        self.first_moving = 0 if given else 2
+        # a fix that lies shows in two differences: a median over five has neither
+        self.usual = None if self.fixes is None else usual_velocity(self.fixes)
+
+    def run(self) -> Start:
+        still = self._standstill()
+        time = self._time(still)
+        velocity, velocity_std = self._velocity(time, still)
+        roll_pitch, tilt_std = self._roll_pitch(time, still, velocity)
+        heading, heading_std = self._heading(time, still, roll_pitch, velocity)
+        attitude = np.array([roll_pitch[0], roll_pitch[1], heading])
+        position, position_std = self._position(time, attitude)
+        if still and self.options.estimate_gyro_bias:
+            self._gyro_biases(still, attitude, position)
+        else:
+            largest = self.error_std[:, :3].max() / DEG
+            self.sources["gyro_bias"] = f"configuration, std up to {largest:.3g} deg/s"
+        given = self.options.attitude_std
+        return Start(
+            time=time,
+            position=position,
+            velocity=velocity,
+            attitude=attitude,
+            position_std=position_std if self.options.position_std is None else self.options.position_std,
+            velocity_std=velocity_std if self.options.velocity_std is None else self.options.velocity_std,
+            attitude_std=np.array([tilt_std, tilt_std, heading_std]) if given is None else given,
+            imu_errors=self.errors,
+            imu_error_std=self.error_std,
+            sources=self.sources,
+        )
+
+    def _standstill(self) -> tuple[float, float] | None:
+        if self.options.static_interval is not None:
+            begin, end = self.options.static_interval
+            if end - begin < WINDOW or len(self.aligned.between(begin, end).time) < 2:
+                raise InputError(
+                    f"start: static interval {begin} to {end} s holds no second of data; expected at least one"
+                )
+            self.sources["standstill"] = f"given: {begin:.3f} to {end:.3f} s"
+            return begin, end
+        nothing_left = self.options.roll_pitch is not None and not self.options.estimate_gyro_bias
+        if nothing_left or self.options.heading_from == "reference":
+            return None
+        found = find_standstill(self.aligned, self.fixes)
+        if found:
+            self.sources["standstill"] = f"found: {found[0]:.3f} to {found[1]:.3f} s"
+        return found
+
+    def _time(self, still: tuple[float, float] | None) -> float:
+        first, last = self.aligned.time[0], self.aligned.time[-1]
+        if self.options.time is not None:
+            wanted, self.sources["time"] = self.options.time, "given"
+        elif still:
+            wanted, self.sources["time"] = min(still[1], last - LEAST_LEFT), "end of the standstill"
+            if self.recording.gnss is not None and self.options.position is None:
+                wanted = max(wanted, float(self.recording.gnss.time[0]))
+        elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
+            wanted, self.sources["time"] = self._moving(first), "first fix in motion"
+        elif self.fixes is not None and self.options.position is None:
+            # between two fixes the position would be off by what the array accelerates there
+            later = self.fixes.time[self.fixes.time >= first]
+            wanted, self.sources["time"] = float(later[0]) if later.size else first, "first fix"
+        else:
+            wanted, self.sources["time"] = first, "first epoch"
+        if not first <= wanted <= last - LEAST_LEFT:
+            raise InputError(
+                f"start: time {wanted:.3f} s; expected within the IMU data, {first:.3f} to {last:.3f} s,"
+                " with at least a second left"
+            )
+        return float(self.aligned.time[np.searchsorted(self.aligned.time, wanted)])
+
+    def _moving(self, after: float) -> float:
+        """Return the time of the first fix after `after` whose speed makes its course a heading."""
+        assert self.fixes is not None
+        assert self.fixes.velocity is not None
+        assert self.usual is not None
+        speed = np.hypot(self.usual[:, 0], self.usual[:, 1])
+        believable = np.linalg.norm(self.fixes.velocity - self.usual, axis=1) < 0.5 + 0.3 * speed
+        moving = np.flatnonzero((speed > COURSE_SPEED) & believable & (self.fixes.time >= after))
+        moving = moving[moving >= self.first_moving]
+        if len(moving) == 0:
+            raise InputError(
+                f"start: no heading: GNSS never moves faster than {COURSE_SPEED} m/s; expected start.heading_deg"
+            )
+        return float(self.fixes.time[moving[0]])
+
+    def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
+        reference = self.recording.reference
+        if self.options.velocity is not None:
+            self.sources["velocity"] = "given"
+            return self.options.velocity, np.full(3, 0.1)
+        if still and still[0] <= time <= still[1] + 0.5:
+            self.sources["velocity"] = "standstill"
+            return np.zeros(3), np.full(3, 0.05)
+        if self.options.heading_from == "reference" and reference is not None:
+            self.sources["velocity"] = "reference"
+            if reference.velocity is None:
+                velocity = _velocity_of_positions(time, reference.time, reference.position, self.recording.geodetic)
+            else:
+                velocity = _interpolate(time, reference.time, reference.velocity)
+            return velocity, np.full(3, 0.3)
+        if self.fixes is not None and self.fixes.velocity is not None:
+            self.sources["velocity"] = "GNSS"
+            return self._velocity_from_fixes(time)
+        raise InputError("start: no velocity; expected GNSS, a standstill, or start.velocity_m_s")
+
+    def _mean(self, begin: float, end: float) -> tuple[Array, Array, float]:
+        """Return the mean rates and specific forces of each IMU, shape (N, 3), biases removed, and the time.
+
+        What is missing counts only for an IMU that has nothing else there.
+        """
+        if (begin, end) not in self.measured:
+            self.measured[begin, end] = _measured(self.aligned.between(begin, end))
+        mean, duration = self.measured[begin, end]
+        return mean[:, :3] - self.errors[:, :3], mean[:, 3:] - self.errors[:, 3:6], duration
+
+    def _roll_pitch(
+        self, time: float, still: tuple[float, float] | None, velocity: Array
+    ) -> tuple[tuple[float, float], float]:
+        reference = self.recording.reference
+        if self.options.roll_pitch is not None:
+            self.sources["roll_pitch"] = "given"
+            return (float(self.options.roll_pitch[0]), float(self.options.roll_pitch[1])), 0.5 * DEG
+        if self.options.heading_from == "reference" and reference is not None and reference.attitude is not None:
+            self.sources["roll_pitch"] = "reference"
+            attitude = _interpolate(time, reference.time, reference.attitude[:, :2])
+            return (float(attitude[0]), float(attitude[1])), 3.0 * DEG
+        if still and still[0] <= time <= still[1] + 0.5:
+            self.sources["roll_pitch"] = "levelled at standstill"
+            _, force, _ = self._mean(*still)
+            bias_std = self.error_std[:, 3:6].mean() / 9.8
+            return level(force.mean(axis=0)), float(max(0.1 * DEG, bias_std))
+        self.sources["roll_pitch"] = "levelled in motion, acceleration from GNSS"
+        _, force, _ = self._mean(time - 0.5, time + 0.5)
+        heading = float(np.arctan2(velocity[1], velocity[0]))
+        return level(force.mean(axis=0), self._acceleration(time), heading), 3.0 * DEG
+
+    def _acceleration(self, time: float) -> Array:
+        if self.fixes is None or self.fixes.velocity is None:
+            return np.zeros(3)
+        ahead = _interpolate(time + 0.5, self.fixes.time, self.fixes.velocity)
+        return np.asarray(ahead - _interpolate(time - 0.5, self.fixes.time, self.fixes.velocity))
+
+    def _heading(
+        self, time: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float], velocity: Array
+    ) -> tuple[float, float]:
+        wanted, reference = self.options.heading_from, self.recording.reference
+        if self.options.heading is not None and wanted in ("auto", "value"):
+            self.sources["heading"] = "given"
+            return self.options.heading, 1.0 * DEG
+        if wanted == "value":
+            raise InputError("start: heading_from is value; expected start.heading_deg")
+        if wanted == "reference" or (wanted == "auto" and self.fixes is None):
+            if reference is None or reference.attitude is None:
+                raise InputError("start: no heading; expected start.heading_deg, GNSS, or a reference with heading")
+            self.sources["heading"] = "reference"
+            unwrapped = np.unwrap(reference.attitude[:, 2:3], axis=0)
+            return float(_interpolate(time, reference.time, unwrapped)[0]), 2.0 * DEG
+        if self.fixes is None:
+            raise InputError("start: heading_from is gnss-course, but there is no GNSS")
+        assert self.fixes.velocity is not None
+        at = self._moving(time)
+        course = _interpolate(at, self.fixes.time, self.fixes.velocity)
+        turned = self._turned(time, at, still, roll_pitch)
+        self.sources["heading"] = f"GNSS course at {at:.3f} s, less {turned / DEG:.1f} deg turned since the start"
+        return float(np.arctan2(course[1], course[0]) - turned), 5.0 * DEG
+
+    def _turned(
+        self, begin: float, end: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float]
+    ) -> float:
+        """Return how far the heading turns from begin to end, from the gyros alone."""
+        if end <= begin:
+            return 0.0
+        bias = self._mean(*still)[0].mean(axis=0) if still else np.zeros(3)
+        part = self.aligned.between(begin, end)
+        known = bias + self.errors[:, :3].mean(axis=0)
+        steps = part.increments[1:, :3].mean(axis=2) - known * np.diff(part.time)[:, None]
+        before = quaternions(np.array([[*roll_pitch, 0.0]]))
+        after = in_succession(np.concatenate([before, of_rotation_vectors(steps)]))
+        return float(euler_angles(after[None, :])[0, 2])
+
+    def _position(self, time: float, attitude: Array) -> tuple[Array, Array]:
+        if self.options.position is not None:
+            self.sources["position"] = "given"
+            self._check_place(time, self.options.position)
+            return self.options.position, np.full(3, 0.1)
+        gnss, reference = self.recording.gnss, self.recording.reference
+        if gnss is None and reference is not None:
+            self.sources["position"] = "reference"
+            point = _interpolate_position(time, reference.time, reference.position, self.recording.geodetic)
+            shift = rotation_matrix(attitude) @ reference.lever_arm
+            return point - shift / metres_per_unit(point, self.recording.geodetic), np.full(3, 0.1)
+        if gnss is None:
+            self.sources["position"] = "zero: there is no position in the recording"
+            return np.zeros(3), np.full(3, 0.01)
+        self.sources["position"] = "GNSS"
+        antenna, std = self._position_from_fixes(time)
+        shift = rotation_matrix(attitude) @ self.recording.rig.antenna
+        return antenna - shift / metres_per_unit(antenna, self.recording.geodetic), std
+
+    def _velocity_from_fixes(self, time: float) -> tuple[Array, Array]:
+        """Return the interpolated velocity and its std; see `_position_from_fixes`."""
+        assert self.fixes is not None
+        assert self.fixes.velocity is not None
+        velocity, std = _interpolate(time, self.fixes.time, self.fixes.velocity), np.full(3, 0.5)
+        around = _around(time, self.fixes.time)
+        usual = np.median(self.fixes.velocity[around], axis=0)
+        allowed = 10.0 * std + 0.5 * HARDEST * np.ptp(self.fixes.time[around])
+        if len(around) < AROUND or np.all(np.abs(velocity - usual) <= allowed):
+            return velocity, std
+        self.sources["velocity"] = f"GNSS, median of {AROUND} fixes"
+        return usual, allowed / 3.0
+
+    def _position_from_fixes(self, time: float) -> tuple[Array, Array]:
+        """Return the interpolated position of the antenna and its std.
+
+        If noise and acceleration do not explain how far it is from the median of the fixes around, each brought to
+        `time` by their median velocity, a fix lies: then that median, and a std that allows for it.
+        """
+        gnss, geodetic = self.recording.gnss, self.recording.geodetic
+        assert gnss is not None
+        position = _interpolate_position(time, gnss.time, gnss.position, geodetic)
+        std = gnss.position_std[int(np.argmin(np.abs(gnss.time - time)))]
+        around = _around(time, gnss.time)
+        if len(around) < AROUND:
+            return position, std
+        assert self.fixes is not None
+        assert self.fixes.velocity is not None
+        metres = metres_per_unit(position, geodetic)
+        motion = np.median(self.fixes.velocity[around], axis=0) * (gnss.time[around] - time)[:, None]
+        off = np.median(_from(position, gnss.position[around], geodetic) * metres - motion, axis=0)
+        allowed = 10.0 * std + 0.125 * HARDEST * np.ptp(gnss.time[around]) ** 2
+        if np.all(np.abs(off) <= allowed):
+            return position, std
+        self.sources["position"] = f"GNSS, median of {AROUND} fixes"
+        return position + off / metres, allowed / 3.0
+
+    def _check_place(self, time: float, position: Array) -> None:
+        gnss = self.recording.gnss
+        if gnss is None:
+            return
+        nearest = gnss.position[int(np.argmin(np.abs(gnss.time - time)))]
+        off = _from(nearest, position[None, :], self.recording.geodetic)[0]
+        distance = float(np.linalg.norm(off * metres_per_unit(nearest, self.recording.geodetic)))
+        if distance > FARTHEST_START:
+            raise InputError(
+                f"start: position is {distance / 1e3:.1f} km from GNSS at {time:.3f} s;"
+                f" expected it within {FARTHEST_START / 1e3:.0f} km"
+            )
+
+    def _gyro_biases(self, still: tuple[float, float], attitude: Array, position: Array) -> None:
+        """Take what the gyros show at a standstill, less the earth's rate, as their biases."""
+        rate, _, duration = self._mean(*still)
+        rate = rate - rotation_matrix(attitude).T @ earth_rate(position, self.recording.geodetic)
+        self.errors[:, :3] += rate
+        for i, imu in enumerate(self.recording.rig.imus):
+            # white noise over the standstill, and a tenth of the grade for what the bias does afterwards
+            self.error_std[i, :3] = np.hypot(
+                imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std
+            )
+        self.sources["gyro_bias"] = f"mean of {duration:.1f} s at standstill"
+
+
+class _RollingSearch(_Search):
+    """The start of a vehicle with wheels, at a standstill: each IMU is levelled by itself.
+
+    The array's attitude is that of the vehicle; an IMU on a wheel looks along the axle, to the right.
+    """
+
+    imu_attitudes: Array
+
+    def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
+        standing = still is not None and still[0] <= time <= still[1] + 0.5
+        if self.options.velocity is None and not standing:
+            raise InputError(
+                "start: no standstill of three seconds; a vehicle with wheels starts at one:"
+                " expected start.static_interval_s, or start.velocity_m_s and start.roll_pitch_deg"
+            )
+        return super()._velocity(time, still)
+
+    def run(self) -> Start:
+        start = super().run()
+        return replace(start, imu_attitudes=self.imu_attitudes)
+
+    def _roll_pitch(
+        self, time: float, still: tuple[float, float] | None, velocity: Array
+    ) -> tuple[tuple[float, float], float]:
+        imus = self.recording.rig.imus
+        self.imu_attitudes = np.zeros((len(imus), 3))
+        given = self.options.roll_pitch
+        if still:
+            self.sources["roll_pitch"] = "levelled at standstill"
+            for i, force in enumerate(self._mean(*still)[1]):
+                self.imu_attitudes[i, :2] = level(force)
+        if given is not None:
+            # at a standstill of the vehicle, whose wheels may have any angle; else of each IMU itself
+            self.sources["roll_pitch"] = "given"
+            self.imu_attitudes[[not still or imu.wheel is None for imu in imus], :2] = given
+        elif not still:
+            raise InputError(
+                "start: no standstill of three seconds; a vehicle with wheels starts at one:"
+                " expected start.static_interval_s or start.roll_pitch_deg"
+            )
+        bodies = [i for i, imu in enumerate(imus) if imu.wheel is None]
+        roll, pitch = self.imu_attitudes[bodies[0], :2] if bodies else (0.0, 0.0)
+        return (float(roll), float(pitch)), 0.5 * DEG
+
+    def _heading(
+        self, time: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float], velocity: Array
+    ) -> tuple[float, float]:
+        heading, std = super()._heading(time, still, roll_pitch, velocity)
+        on_wheel = np.array([imu.wheel is not None for imu in self.recording.rig.imus])
+        # the heading of an axle that is tilted by roll and pitch differs from the vehicle's plus 90 degrees
+        axle = rotation_matrix(np.array([*roll_pitch, heading]))[:, 1]
+        self.imu_attitudes[:, 2] = np.where(on_wheel, np.arctan2(axle[1], axle[0]), heading)
+        return heading, std
+
+    def _gyro_biases(self, still: tuple[float, float], attitude: Array, position: Array) -> None:
+        rates, _, duration = self._mean(*still)
+        for i, imu in enumerate(self.recording.rig.imus):
+            turning = rotation_matrix(self.imu_attitudes[i]).T @ earth_rate(position, self.recording.geodetic)
+            self.errors[i, :3] += rates[i] - turning
+            self.error_std[i, :3] = np.hypot(
+                imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std
+            )
+        self.sources["gyro_bias"] = f"mean of {duration:.1f} s at standstill"
+
+
+def _measured(part: Aligned) -> tuple[Array, float]:
+    """Return the mean rates and specific forces of each IMU, shape (N, 6), and the time in which they were measured."""
+    have = ~part.missing[1:]
+    have[:, ~have.any(axis=0)] = True
+    mean = np.einsum("tki,ti->ik", part.increments[1:], have) / (np.diff(part.time) @ have)[:, None]
+    return mean, float(part.time[-1] - part.time[0])
+
+
+def usual_velocity(fixes: GnssStream) -> Array:
+    """Return the velocities with each component's median over five fixes, m/s, shape (M, 3)."""
+    assert fixes.velocity is not None
+    padded = np.pad(fixes.velocity, ((2, 2), (0, 0)), mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1))
+
+
+def find_standstill(aligned: Aligned, fixes: GnssStream | None) -> tuple[float, float] | None:
+    """Return the first interval of at least three seconds, at most sixty, in which the array stands still.
+
+    Judged second by second: rates and forces averaged over tenths of a second hardly vary, and the usual speed that
+    GNSS gives, where it gives one, is that of its noise.
+    """
+    window = max(2, round(WINDOW * aligned.rate_hz))
+    tenth = max(1, round(0.1 * aligned.rate_hz))
+    tenths = window // tenth
+    count = len(aligned.time) // (tenth * tenths)
+    if count < SHORTEST_STANDSTILL / WINDOW:
+        return None
+    used = count * tenths * tenth
+    rates = aligned.increments[:used].mean(axis=2) * aligned.rate_hz
+    spread = rates.reshape(count, tenths, tenth, 6).mean(axis=2).std(axis=1)
+    still = (spread[:, :3].max(axis=1) < STILL_RATE) & (spread[:, 3:].max(axis=1) < STILL_FORCE)
+    edges = aligned.time[np.minimum(np.arange(count + 1) * tenths * tenth, len(aligned.time) - 1)]
+    if fixes is not None and fixes.velocity is not None:
+        speed = np.linalg.norm(usual_velocity(fixes), axis=1)
+        noise = 4.0 * fixes.position_std.max(axis=1)
+        moving = fixes.time[speed > np.maximum(0.3, noise)]
+        for t in moving:
+            still[(edges[:-1] - 1.0 < t) & (t < edges[1:] + 1.0)] = False
+    runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
+    for begin, end in zip(runs[::2], runs[1::2], strict=True):
+        if edges[end] - edges[begin] >= SHORTEST_STANDSTILL:
+            return float(edges[begin]), float(min(edges[end], edges[begin] + LONGEST_STANDSTILL))
+    return None
+
+
+def level(force: Array, acceleration: Array | None = None, heading: float = 0.0) -> tuple[float, float]:
+    """Return roll and pitch (rad) from a mean specific force, and where in motion the acceleration in n.
+
+    C f = a - g, with the heading given: roll and pitch turn f into the level frame's a - g.
+    """
+    a = np.zeros(3) if acceleration is None else acceleration
+    ahead = a[0] * np.cos(heading) + a[1] * np.sin(heading)
+    aside = -a[0] * np.sin(heading) + a[1] * np.cos(heading)
+    vertical = np.hypot(force[1], force[2])
+    roll = np.arcsin(np.clip(aside / vertical, -1, 1)) - np.arctan2(force[1], -force[2])
+    z = force[1] * np.sin(roll) + force[2] * np.cos(roll)
+    pitch = np.arctan2(force[0], -z) - np.arcsin(np.clip(ahead / np.hypot(force[0], z), -1, 1))
+    return float((roll + np.pi) % (2 * np.pi) - np.pi), float(pitch)
+
+
+def rotation_matrix(attitude: Array) -> Array:
+    """Return C_nb of roll, pitch, heading (rad), shape (3, 3)."""
+    return np.asarray(rotation_matrices(quaternions(attitude[None, :]))[0])
+
+
+def quaternion(attitude: Array) -> Array:
+    """Return q_nb, scalar first and not negative, of roll, pitch, heading (rad), shape (4,)."""
+    q = quaternions(attitude[None, :])[0]
+    return np.asarray(np.copysign(1.0, q[0]) * q)
+
+
+def earth_rate(position: Array, geodetic: bool) -> Array:
+    """Return the earth's angular rate, rad/s north, east, down, shape (3,); zero on a local plane."""
+    if not geodetic:
+        return np.zeros(3)
+    return earth.EARTH_RATE_RAD_S * np.array([np.cos(position[0]), 0.0, -np.sin(position[0])])
+
+
+def velocities_from_positions(gnss: GnssStream, geodetic: bool) -> GnssStream | None:
+    """Return the stream with velocities, differenced from positions where the receiver gives none.
+
+    A single fix has none: None.
+    """
+    if gnss.velocity is not None:
+        return gnss
+    if len(gnss.time) < 2:
+        return None
+    return replace(gnss, velocity=_differences(gnss.time, gnss.position, geodetic))
+
+
+def _differences(time: Array, position: Array, geodetic: bool) -> Array:
+    metres = _from(position[0], position, geodetic) * metres_per_unit(position[0], geodetic)
+    return np.asarray(np.gradient(metres, time, axis=0))
+
+
+def _velocity_of_positions(at: float, time: Array, position: Array, geodetic: bool) -> Array:
+    """Return the velocity of a parabola through the positions within half a second, three of them at least.
+
+    The difference of neighbours would multiply their noise, or the steps in which they are written, by the rate.
+    """
+    within = np.searchsorted(time, [at - 0.5, at + 0.5])
+    first = int(np.clip(np.searchsorted(time, at) - 1, 0, max(0, len(time) - 3)))
+    near = slice(min(within[0], first), max(within[1], first + 3))
+    metres = _from(position[near][0], position[near], geodetic) * metres_per_unit(position[near][0], geodetic)
+    degree = min(2, len(metres) - 1)
+    return np.asarray(np.polyfit(time[near] - at, metres, degree)[-2] if degree else np.zeros(3))
+
+
+def _around(time: float, times: Array) -> NDArray[np.intp]:
+    """Return the indices of the fixes nearest to a time."""
+    return np.argsort(np.abs(times - time), kind="stable")[:AROUND]
+
+
+def _from(origin: Array, position: Array, geodetic: bool) -> Array:
+    """Return coordinates relative to `origin`, longitudes the shorter way round."""
+    relative = position - origin
+    if geodetic:
+        relative[:, 1] = (relative[:, 1] + np.pi) % (2.0 * np.pi) - np.pi
+    return np.asarray(relative)
+
+
+def _interpolate_position(at: float, time: Array, position: Array, geodetic: bool) -> Array:
+    nearest = position[int(np.argmin(np.abs(time - at)))]
+    return np.asarray(nearest + _interpolate(at, time, _from(nearest, position, geodetic)))
+
+
+def _interpolate(at: float, time: Array, values: Array) -> Array:
+    return np.array([np.interp(at, time, values[:, k]) for k in range(values.shape[1])])

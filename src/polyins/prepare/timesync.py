@@ -1,0 +1,187 @@
+"""Streams of several IMUs onto one time base, by integrating increments and never by sampling rates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.model.recording import ImuStream, usual_interval
+
+Array = NDArray[np.float64]
+
+LATE = 1.0
+"""s: an IMU that begins so long after the others is waited for, one that ends so long before them is not"""
+
+GAP = 3.5
+"""An interval longer than this many nominal ones is a gap: what was measured in it is lost."""
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """Increments of N IMUs over common intervals."""
+
+    time: Array
+    """s, shape (T,)"""
+    increments: Array
+    """dtheta (rad) and dvel (m/s) over the interval that ends at `time`, shape (T, 6, N)"""
+    warnings: tuple[str, ...]
+    missing: NDArray[np.bool_]
+    """where an IMU has a gap, shape (T, N); what stands there is bridged, or zero"""
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate: one over the usual interval."""
+        return 1.0 / usual_interval(self.time)
+
+    def between(self, begin: float, end: float) -> Aligned:
+        """Return the epochs with begin <= time <= end."""
+        first, last = np.searchsorted(self.time, [begin, np.nextafter(end, np.inf)])
+        part = slice(first, last)
+        return Aligned(self.time[part], self.increments[part], self.warnings, self.missing[part])
+
+
+def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Sequence[int] | None = None) -> Aligned:
+    """Bring the streams onto the time stamps of the first one without gaps, within their common span.
+
+    The increments of the others are shared out between its intervals, so that no rotation or velocity is lost or
+    counted twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one,
+    the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Where the
+    streams are a part of longer ones, `gap_counts` says how many gaps those have. Raises InputError if less than two
+    seconds are common.
+    """
+    gaps_by_stream = [gaps_of(stream.time) for stream in streams]
+    time = _common_time(streams, gap_counts or [len(gaps) for gaps in gaps_by_stream])
+    on_base: list[tuple[Array, Array]] = []
+    missing = np.zeros((len(time), len(streams)), dtype=bool)
+    warnings = late_warnings(streams)
+    for i, (stream, known) in enumerate(zip(streams, gaps_by_stream, strict=True)):
+        if len(stream.time) == len(time) and np.array_equal(stream.time, time):
+            on_base.append((stream.dtheta, stream.dvel))
+        else:
+            values = _resample(stream.time, np.hstack([stream.dtheta, stream.dvel]), time)
+            on_base.append((values[:, :3], values[:, 3:]))
+        gaps = [g for g in known if g[1] > time[0] and g[0] < time[-1]]
+        stops = float(stream.time[-1])
+        if time[-1] - stops > LATE:
+            gaps.append((stops, float(time[-1])))
+        for begin, end in gaps:
+            missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
+        if gaps:
+            warnings.append(gap_warning(stream.name, gaps))
+    increments = _interleaved(on_base, len(time))
+    if missing.any():
+        if bridge:
+            _bridge(time, increments, missing)
+        else:
+            increments[np.broadcast_to(missing[:, None, :], increments.shape)] = 0.0
+    return Aligned(time, increments, tuple(warnings), missing)
+
+
+def late_warnings(streams: tuple[ImuStream, ...]) -> list[str]:
+    """Say which IMU the others have to wait for."""
+    begins = np.array([stream.time[0] for stream in streams])
+    latest = int(np.argmax(begins))
+    wait = float(begins[latest] - begins.min())
+    if wait <= LATE:
+        return []
+    return [
+        f"IMU {streams[latest].name}: begins at {begins[latest]:.3f} s, {wait:.1f} s after the first one; what the"
+        " others measured before is not used"
+    ]
+
+
+def common_end(ends: Array) -> float:
+    """Return when a recording ends whose streams end then, s; one that stops long before others has a gap."""
+    return float(ends[ends > ends.max() - LATE].min())
+
+
+def _interleaved(streams: Sequence[tuple[Array, Array]], epochs: int) -> Array:
+    """Return the increments of all streams side by side, shape (T, 6, N)."""
+    from polyins.kernels.resample import TOGETHER, interleave
+
+    increments = np.empty((epochs, 6, len(streams)))
+    for first in range(0, len(streams), TOGETHER):
+        some = [streams[min(i, len(streams) - 1)] for i in range(first, first + TOGETHER)]
+        for row, vectors in enumerate(zip(*some, strict=True)):
+            # of one layout, for which the kernel is compiled once
+            alike = tuple(np.require(each, np.float64, ["C", "W"]) for each in vectors)
+            interleave(alike, first, 3 * row, increments)
+    return increments
+
+
+def _common_time(streams: tuple[ImuStream, ...], gap_counts: Sequence[int]) -> Array:
+    """Return the stamps of the stream with the fewest gaps, filled up in them with those of others.
+
+    The time goes on where a stream ends for good while others go on.
+    """
+    begin = max(stream.time[0] for stream in streams)
+    ends = np.array([stream.time[-1] for stream in streams])
+    end = common_end(ends)
+    if min(end, ends.min()) - begin < 2.0:
+        spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
+        raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
+    # the first whose gaps are few: a gap in the base is one for all
+    order = sorted(range(len(streams)), key=lambda i: (gap_counts[i], streams[i].time[-1] < end))
+    ordered = [streams[i] for i in order]
+    base: Array = ordered[0].time[(ordered[0].time >= begin) & (ordered[0].time <= end)]
+    nominal = usual_interval(base)
+    empty = _empty_until(base, end, nominal)
+    for stream in ordered[1:]:
+        parts = [base]
+        for first, last in empty:
+            inside = (stream.time > first + 0.5 * nominal) & (stream.time < last - 0.5 * nominal)
+            parts.append(stream.time[inside])
+        if any(map(len, parts[1:])):
+            base = np.sort(np.concatenate(parts))
+            empty = _empty_until(base, end, nominal)
+    return base
+
+
+def _empty_until(base: Array, end: float, nominal: float) -> list[tuple[float, float]]:
+    """Return the gaps of a clock, and what it lacks until the end."""
+    return [*gaps_of(base), *([(float(base[-1]), end + nominal)] if end - base[-1] > GAP * nominal else [])]
+
+
+def _resample(stamps: Array, values: Array, time: Array) -> Array:
+    """Return what was measured over the intervals of `time`; a sample is constant within its own."""
+    from polyins.kernels.resample import resample
+
+    out = np.empty((len(time), values.shape[1]))
+    before, begin = stamps[0] - usual_interval(stamps), time[0] - usual_interval(time)
+    resample(np.ascontiguousarray(stamps), values, before, np.ascontiguousarray(time), begin, out)
+    return out
+
+
+def gaps_of(stamps: Array, usual: float | None = None) -> list[tuple[float, float]]:
+    """Return where stamps are missing: the last before and the first after each gap, s.
+
+    `usual`: the usual interval, where `stamps` are a part of more.
+    """
+    where = np.flatnonzero(np.diff(stamps) > GAP * (usual_interval(stamps) if usual is None else usual))
+    return [(float(stamps[k]), float(stamps[k + 1])) for k in where]
+
+
+def gap_warning(name: str, gaps: Sequence[tuple[float, float]]) -> str:
+    """Say how many gaps an IMU has and where the longest is."""
+    begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
+    count = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
+    return f"IMU {name}: {count} of {end - begin:.3f} s at {begin:.3f} s"
+
+
+def _bridge(time: Array, increments: Array, missing: NDArray[np.bool_]) -> None:
+    have = ~missing
+    some = missing.any(axis=1) & have.any(axis=1)
+    for k in np.flatnonzero(some):
+        increments[k][:, missing[k]] = increments[k][:, have[k]].mean(axis=1, keepdims=True)
+    none = np.flatnonzero(~have.any(axis=1))
+    intervals = np.diff(time, prepend=2 * time[0] - time[1])
+    good = np.flatnonzero(have.any(axis=1))
+    for k in none:
+        before = good[good < k][-1:] if (good < k).any() else good[:1]
+        after = good[good > k][:1] if (good > k).any() else good[-1:]
+        rates = [increments[j[0]] / intervals[j[0]] for j in (before, after)]
+        increments[k] = 0.5 * (rates[0] + rates[1]) * intervals[k]

@@ -1,0 +1,1 @@
+"""From a configuration and its files to a recording; data sets by name."""

@@ -1,0 +1,168 @@
+"""One IMU as configured: its file read, checked, and turned into array axes on the recording's clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.checks import stream_checks
+from polyins.checks.faults import clipped, without_faults
+from polyins.config import ImuEntry, InitialErrors, InitialStd, Noise
+from polyins.config.wheel_mount import wheel, wheel_rotation
+from polyins.config.yaml_document import Document
+from polyins.errors import InputError
+from polyins.files import find_named
+from polyins.formats import kf_gins, table, xsens_dot
+from polyins.formats.recognize import imu_format
+from polyins.formats.rows import ImuRows, intervals, without
+from polyins.model.axes import axes_matrix
+from polyins.model.recording import Array, ImuStream
+from polyins.model.rig import DEG, PPM, Imu, ImuErrors, NoiseGrade
+
+FULL = 0.999
+"""A rate above this part of the full scale has reached it."""
+MOST_SATURATED = 0.1
+"""of the rows"""
+
+
+def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuStream, tuple[str, ...]]:
+    """Read the IMU of that index; returns its mount and errors, its increments in array axes, and warnings.
+
+    Raises InputError for data and settings that cannot be right.
+    """
+    with document.at(["imus", index, "file"]):
+        find_named(entry.file)
+    rows, saturated = _within_range(_rows(entry, document.place(["imus", index])), entry)
+    warnings = (*_checked(rows, entry), *saturated)
+    rows, faults = without_faults(rows, entry.name, entry.clock_offset_s)
+    range_known = (entry.gyro_range_deg_s or rows.gyro_range_deg_s) is not None
+    warnings += (*faults, *clipped(rows, entry.name, entry.clock_offset_s, gyro=not range_known))
+    stream = in_array_axes(rows, entry)
+    if entry.wheel is None:
+        place = document.place(["imus", index, "axes"])
+        stream_checks.check_upright(entry.name, place, entry.axes, stream.time, stream.dvel)
+    with document.at(["imus", index]):
+        return as_mounted(entry), stream, warnings
+
+
+def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
+    """Return rows as increments in array axes, on a wheel in the module's, on the recording's clock."""
+    rotation = sensor_rotation(entry)
+    dtheta, dvel = _turned(rotation, rows.dtheta), _turned(rotation, rows.dvel)
+    return ImuStream(entry.name, rows.time + entry.clock_offset_s, dtheta, dvel)
+
+
+def as_mounted(entry: ImuEntry) -> Imu:
+    """Return what a configuration says of an IMU."""
+    return Imu(
+        entry.name,
+        noise_grade(entry.noise),
+        sensor_rotation(entry),
+        np.array(entry.position_m),
+        _initial_errors(entry.initial_errors),
+        initial_std(entry.initial_std, noise_grade(entry.noise).slow_std()),
+        wheel=None if entry.wheel is None else wheel(entry.wheel),
+        module=entry.module,
+        mount_std=entry.mount_std_deg * DEG,
+    )
+
+
+def _rows(entry: ImuEntry, place: str) -> ImuRows:
+    kind: str = entry.format
+    if kind == "auto":
+        kind = "table" if entry.columns else imu_format(entry.file)
+    if entry.columns and kind != "table":
+        raise InputError(f"{place}: columns are given and format is {kind}; expected columns with format table only")
+    if kind == "wheel-ins":
+        return kf_gins.read_rates(entry.file, entry.rate_hz)
+    if kind == "xsens-dot":
+        return xsens_dot.read_imu(entry.file, entry.rate_hz)
+    if kind == "table":
+        return table.read_imu(entry.file, entry.columns, entry.rate_hz)
+    rows = kf_gins.read_imu(entry.file)
+    return replace(rows, time=np.arange(len(rows.time)) / entry.rate_hz) if entry.rate_hz else rows
+
+
+def _checked(rows: ImuRows, entry: ImuEntry) -> tuple[str, ...]:
+    if entry.wheel is None:
+        return stream_checks.check_imu(rows)
+    return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, entry.wheel.radius_m)
+
+
+def _within_range(rows: ImuRows, entry: ImuEntry) -> tuple[ImuRows, tuple[str, ...]]:
+    """Leave out rows whose rate reaches the gyro's full scale: how fast it turned then is not known."""
+    limit = entry.gyro_range_deg_s or rows.gyro_range_deg_s
+    if limit is None or len(rows.time) < 2:
+        return rows, ()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rates = np.abs(rows.dtheta / intervals(rows.time)[:, None]).max(axis=1) / DEG
+    saturated = rates >= FULL * limit
+    count = int(np.sum(saturated))
+    if not count:
+        return rows, ()
+    if count > MOST_SATURATED * len(rates):
+        raise InputError(
+            f"{rows.source.path}: {count} of {len(rates)} rows reach the gyro's full scale, {limit:g} deg/s; expected "
+            "few: gyro_range_deg_s or the unit is wrong, or the sensor does not suit"
+        )
+    first = rows.time[int(np.argmax(saturated))] + entry.clock_offset_s
+    return without(rows, saturated), (
+        f"{rows.source.path}: the gyro reaches its full scale, {limit:g} deg/s, in {count} row(s), the first at "
+        f"{first:.3f} s; they are left out",
+    )
+
+
+def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:
+    """Return the matrix that maps sensor vectors to the array's axes, on a wheel to the module's, shape (3, 3)."""
+    if entry.wheel is not None:
+        return wheel_rotation(entry.wheel)
+    return mount_rotation(entry.mount_deg) @ axes_matrix(entry.axes)
+
+
+def _turned(rotation: Array, increments: Array) -> Array:
+    if np.array_equal(rotation, np.eye(3)):
+        return increments
+    # a matrix product would wake every BLAS thread for a 3 x 3 matrix
+    return np.asarray(np.einsum("ij,tj->ti", rotation, increments))
+
+
+def mount_rotation(mount_deg: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3), of roll, pitch, yaw in degrees."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(np.radians(mount_deg)), np.sin(np.radians(mount_deg))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def noise_grade(noise: Noise) -> NoiseGrade:
+    """Convert a noise section to SI."""
+    return NoiseGrade.from_datasheet(**noise.model_dump(exclude={"grade"}))
+
+
+def _initial_errors(errors: InitialErrors) -> ImuErrors:
+    return ImuErrors(
+        np.array(errors.gyro_bias_deg_s) * DEG,
+        np.array(errors.accel_bias_m_s2),
+        np.array(errors.gyro_scale_ppm) * PPM,
+        np.array(errors.accel_scale_ppm) * PPM,
+    )
+
+
+def initial_std(std: InitialStd, otherwise: ImuErrors) -> ImuErrors:
+    """Return in SI how sure the initial errors of an IMU are; `otherwise` has what is not given."""
+
+    def of(given: tuple[float, float, float] | None, unit: float, own: Array) -> Array:
+        return own if given is None else np.array(given) * unit
+
+    return ImuErrors(
+        of(std.gyro_bias_deg_s, DEG, otherwise.gyro_bias),
+        of(std.accel_bias_m_s2, 1.0, otherwise.accel_bias),
+        of(std.gyro_scale_ppm, PPM, otherwise.gyro_scale),
+        of(std.accel_scale_ppm, PPM, otherwise.accel_scale),
+    )

@@ -1,0 +1,249 @@
+"""From a configuration file to a `Recording`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polyins.checks import faults, stream_checks, wheel_checks
+from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_configuration
+from polyins.config.yaml_document import Document, read_yaml, write_yaml
+from polyins.errors import InputError
+from polyins.model.recording import FilterOptions, ImuStream, Offset, Recording
+from polyins.model.rig import Imu, Rig
+from polyins.reading import catalogue, clocks
+from polyins.reading.imu_stream import as_mounted, read_imu
+from polyins.reading.position_stream import read_gnss, read_reference
+from polyins.reading.timing import outage_intervals, start_options
+
+Settings = tuple[Config, Document, tuple[str, ...]]
+"""a configuration, the document that says where its keys stand, and warnings"""
+
+NOT_IN_FORCE = {"dataset", "imu_defaults"}
+"""keys that the others take in"""
+
+
+def load(path: str | Path) -> Recording:
+    """Read the recording that a configuration describes: polyins YAML, or a KF-GINS or Wheel-INS file.
+
+    They are told apart by content. Raises InputError, before anything is computed, for a configuration or data that
+    cannot be right.
+    """
+    return load_settings(read_config(path))
+
+
+def load_settings(settings: Settings) -> Recording:
+    """Read the recording that a configuration describes which is read already; raises InputError as `load` does."""
+    config, document, warnings = settings
+    recording = build(config, document)
+    return replace(recording, warnings=(*warnings, *recording.warnings))
+
+
+def read_config(path: str | Path) -> Settings:
+    """Read a configuration file; file names in it come out absolute.
+
+    Returns the configuration, the document that says where its keys stand, and warnings.
+    """
+    document = read_yaml(path)
+    warnings: tuple[str, ...] = ()
+    for program in (wheel_ins_configuration, kf_gins_configuration):
+        if program.recognizes(document):
+            values, warnings = program.translated(document)
+            document = Document(document.path, values)
+            break
+    return _located(document), document, warnings
+
+
+def names_of(settings: Sequence[Settings]) -> list[str]:
+    """Return a name for each of several configurations: its own, after that of its folder where they share one.
+
+    Raises InputError if two are still the same, or one cannot name a folder.
+    """
+    own = [config.name for config, _, _ in settings]
+    names: dict[str, Path] = {}
+    for name, (_, document, _) in zip(own, settings, strict=True):
+        path = document.path.resolve()
+        if Path(name).name != name:
+            raise InputError(f"{document.place(['name'])}: is {name!r}; expected what may be the name of a folder")
+        longer = name if own.count(name) == 1 else f"{path.parent.name}/{name}"
+        if longer in names:
+            raise InputError(
+                f"{path}: is named {longer!r} as is {names[longer]}; expected recordings that differ in name"
+            )
+        names[longer] = path
+    return list(names)
+
+
+def load_document(document: Document) -> Recording:
+    """Read the recording that the values of a configuration describe; raises InputError as `load` does."""
+    return build(_located(document), document)
+
+
+def _located(document: Document) -> Config:
+    config = parse(document)
+    with document.at(["dataset"]):
+        folder = catalogue.fetch(config.dataset) if config.dataset else document.path.parent.resolve()
+    return _with_absolute_paths(config, folder, document.path)
+
+
+def build(config: Config, document: Document, wheels_known: bool = True) -> Recording:
+    """Read and check the streams that a configuration names.
+
+    `wheels_known`: check that wheels turn as declared; what calibrates them needs not know yet.
+    """
+    notes = wheel_checks.check_settings(config, document)
+    read = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
+    imus, streams, warnings = zip(*read, strict=True)
+    notes += _one_by_kind([text for texts in warnings for text in texts])
+    faults.check_alive(streams)
+    config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
+    notes += [clocks.described(offset) for offset in offsets]
+    span = stream_checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})
+    recording = assemble(config, document, imus, streams, span, wheels_known)
+    warnings = (*notes, *recording.warnings)
+    return replace(recording, warnings=warnings, clock_offsets=offsets, config_text=in_force(config, offsets))
+
+
+def assemble(
+    config: Config,
+    document: Document,
+    imus: tuple[Imu, ...],
+    streams: tuple[ImuStream, ...],
+    span: tuple[float, float],
+    wheels_known: bool = True,
+) -> Recording:
+    """Read what a configuration names beside the IMUs, whose data cover `span`, and put all together."""
+    notes: list[str] = []
+    gnss = reference = geodetic = None
+    if config.gnss:
+        gnss, geodetic, texts = read_gnss(config.gnss, document, span)
+        notes += texts
+    if wheels_known:
+        notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
+    if config.reference:
+        reference, kind, texts = read_reference(config.reference, document, span)
+        geodetic = _one_kind(geodetic, kind, document.place(["reference"]))
+        notes += texts
+    if config.start.position:
+        geodetic = _one_kind(geodetic, config.start.position.geodetic, document.place(["start", "position"]))
+    start, texts = start_options(config.start, document, span)
+    return Recording(
+        _rig(config, document, imus),
+        streams,
+        gnss,
+        reference,
+        geodetic=bool(geodetic),
+        outages=outage_intervals(config, document, span, gnss),
+        start=start,
+        options=_filter_options(config),
+        name=config.name,
+        warnings=(*notes, *texts),
+    )
+
+
+def without_data(config: Config, document: Document) -> tuple[Recording, tuple[str, ...]]:
+    """Return a recording that has no streams yet: the rig, how to start, what the filter is told; and warnings.
+
+    Positions are geodetic unless there is no GNSS or it is turned into metres, or the start's are on a local plane.
+    Raises InputError for settings that need data beforehand.
+    """
+    notes = wheel_checks.check_settings(config, document)
+    for index, entry in enumerate(config.imus):
+        if entry.time_offset:
+            place = document.place(["imus", index, "time_offset"])
+            raise InputError(f"{place}: is found from a whole recording; expected clock_offset_s")
+    if config.start.heading_from == "reference":
+        place = document.place(["start", "heading_from"])
+        raise InputError(f"{place}: is reference, which live data have not; expected heading_deg or gnss-course")
+    imus = []
+    for index, entry in enumerate(config.imus):
+        with document.at(["imus", index]):
+            imus.append(as_mounted(entry))
+    start, texts = start_options(config.start, document, clocks.ALWAYS)
+    geodetic = config.gnss is not None and config.gnss.plane_origin is None
+    if config.start.position:
+        geodetic = config.start.position.geodetic
+    rig, options = _rig(config, document, tuple(imus)), _filter_options(config)
+    recording = Recording(rig, (), geodetic=geodetic, start=start, options=options, name=config.name)
+    return recording, (*notes, *texts, *_not_live(config))
+
+
+def _not_live(config: Config) -> list[str]:
+    """Say what is configured and not looked at in live data."""
+    keys = {
+        "outages": bool(config.outages),
+        "reference": config.reference is not None,
+        "gnss.rate_hz": config.gnss is not None and config.gnss.rate_hz is not None,
+        "imus[].rate_hz": any(imu.rate_hz is not None for imu in config.imus),
+        "imus[].gyro_range_deg_s": any(imu.gyro_range_deg_s is not None for imu in config.imus),
+        "start.end_time_s": config.start.end_time_s is not None,
+    }
+    return [f"{key}: is not looked at in live data" for key, given in keys.items() if given]
+
+
+def _rig(config: Config, document: Document, imus: tuple[Imu, ...]) -> Rig:
+    with document.at(["gnss", "antenna_position_m"]):
+        return Rig(imus, np.array(config.gnss.antenna_position_m) if config.gnss else np.zeros(3))
+
+
+def in_force(config: Config, offsets: tuple[Offset, ...] = ()) -> str:
+    """Return the configuration as YAML, with the clock offsets that were found in the place of those to be found."""
+    found = {offset.name: offset.offset_s for offset in offsets}
+    imus = tuple(
+        imu.model_copy(update={"clock_offset_s": imu.clock_offset_s + found.get(imu.name, 0.0), "time_offset": None})
+        if imu.time_offset
+        else imu
+        for imu in config.imus
+    )
+    gnss = config.gnss and config.gnss.model_copy(update={"time_offset": None})
+    known = config.model_copy(update={"imus": imus, "gnss": gnss})
+    return write_yaml(known.model_dump(mode="json", exclude=NOT_IN_FORCE))
+
+
+def _one_by_kind(notes: list[str]) -> list[str]:
+    """Say only once what several files have in common, word for word but for their names."""
+    places: dict[str, list[str]] = {}
+    for note in notes:
+        place, _, text = note.partition(": ")
+        places.setdefault(text, []).append(place)
+    return [
+        f"{found[0]}{f' and {len(found) - 1} files more' if len(found) > 1 else ''}: {text}"
+        for text, found in places.items()
+    ]
+
+
+def _filter_options(config: Config) -> FilterOptions:
+    return FilterOptions(
+        gate_limit=config.filter.gate_limit,
+        gate_reopen_after=config.filter.gate_reopen_after,
+        gnss_snap=config.filter.gnss_snap_s,
+        gravity=config.filter.gravity_m_s2,
+        rolling=config.filter.rolling.options(),
+    )
+
+
+def _one_kind(known: bool | None, new: bool, place: str) -> bool:
+    """Return whether positions are geodetic; all must be of one kind."""
+    if known is not None and known != new:
+        kinds = {True: "latitude and longitude", False: "on a local plane"}
+        raise InputError(f"{place}: positions are {kinds[new]}, those before {kinds[known]}; expected one kind")
+    return new
+
+
+def _with_absolute_paths(config: Config, folder: Path, path: Path) -> Config:
+    def absolute(entry: Any) -> Any:
+        if not entry or not entry.file:
+            return entry
+        return entry.model_copy(update={"file": str(folder / Path(entry.file).expanduser())})
+
+    changes = {
+        "name": config.name or path.stem,
+        "imus": tuple(absolute(imu) for imu in config.imus),
+        "gnss": absolute(config.gnss),
+        "reference": absolute(config.reference),
+    }
+    return config.model_copy(update=changes)

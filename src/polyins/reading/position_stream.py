@@ -1,0 +1,138 @@
+"""GNSS and reference as configured: files read, checked, heights above the ellipsoid, on the recording's clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.checks import stream_checks
+from polyins.config import GnssEntry, ReferenceEntry
+from polyins.config.yaml_document import Document
+from polyins.errors import InputError
+from polyins.files import find_named
+from polyins.formats import kf_gins, rtklib, table
+from polyins.formats.recognize import track_format
+from polyins.formats.rows import Track
+from polyins.model.geodesy import displacement
+from polyins.model.recording import Array, GnssStream, Reference
+from polyins.model.rig import DEG, check_lever_arm
+
+Span = tuple[float, float]
+
+
+def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) -> tuple[Track, list[str]]:
+    """Read and check positions, heights above the ellipsoid, stamps on the recording's clock."""
+    with document.at([section, "file"]):
+        find_named(entry.file)
+    kind: str = entry.format
+    if kind == "auto":
+        kind = "table" if entry.columns else track_format(entry.file)
+    if entry.columns and kind != "table":
+        place = document.place([section, "columns"])
+        raise InputError(f"{place}: given with format {kind}; expected columns with format table only")
+    readers = {"kf-gins": kf_gins.read_gnss, "kf-gins-nav": kf_gins.read_nav, "rtklib-pos": rtklib.read_gnss}
+    track = readers[kind](entry.file) if kind in readers else table.read_track(entry.file, entry.columns)
+    warnings = list(stream_checks.check_track(track, section))
+    track = replace(track, time=track.time + entry.clock_offset_s)
+    return _above_ellipsoid(track, entry, section, document), warnings
+
+
+def _above_ellipsoid(track: Track, entry: GnssEntry | ReferenceEntry, section: str, document: Document) -> Track:
+    """Convert heights above the sea, or refuse them."""
+    if entry.height == "ellipsoidal" and not track.above_sea:
+        return track
+    if entry.height == "ellipsoidal":
+        place = document.place([section, "height"])
+        raise InputError(f"{place}: heights in {track.source.path} are above the sea; expected height: sea-level")
+    if not track.geodetic:
+        return track
+    if entry.geoid_height_m is None:
+        raise InputError(
+            f"{document.place([section, 'height'])}: sea-level heights need geoid_height_m; expected the height of the "
+            "geoid above the ellipsoid at the place, m"
+        )
+    return replace(track, position=track.position + np.array([0.0, 0.0, entry.geoid_height_m]))
+
+
+def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStream, bool, list[str]]:
+    """Read the fixes; returns them, whether they are geodetic, and warnings. `span`: of the IMUs, s.
+
+    Raises InputError for data and settings that cannot be right.
+    """
+    track, warnings = _track(entry, "gnss", document)
+    std = track.position_std
+    if entry.position_std_m is not None:
+        std = np.tile(entry.position_std_m, (len(track.time), 1))
+    if std is None:
+        place = document.place(["gnss"])
+        raise InputError(f"{place}: {track.source.path} has no position std; expected position_std_m")
+    stream_checks.check_std(track.source, std)
+    warnings += stream_checks.check_within(track.source, "GNSS", track.time, span)
+    track = _on_plane(track, entry, document)
+    kept = thinned(track.time, entry.rate_hz) if entry.rate_hz else np.arange(len(track.time))
+    velocity = track.velocity if track.velocity_std is not None else None
+    if track.velocity is not None and velocity is None:
+        warnings.append(f"{track.source.path}: GNSS velocity has no std and is not used")
+    stream = GnssStream(
+        track.time[kept],
+        track.position[kept],
+        std[kept],
+        None if velocity is None else velocity[kept],
+        None if velocity is None or track.velocity_std is None else track.velocity_std[kept],
+    )
+    return stream, track.geodetic, warnings
+
+
+def _on_plane(track: Track, entry: GnssEntry, document: Document) -> Track:
+    """Convert geodetic positions to a local plane, if the entry gives its origin."""
+    origin = entry.plane_origin
+    if origin is None:
+        return track
+    if not track.geodetic:
+        place = document.place(["gnss", "plane_origin"])
+        raise InputError(f"{place}: given for positions in metres; expected it with latitude and longitude only")
+    point = np.array([origin.latitude_deg * DEG, origin.longitude_deg * DEG, origin.height_m])
+    return replace(track, position=displacement(track.position, point, True) * [1.0, 1.0, -1.0], geodetic=False)
+
+
+def thinned(time: Array, rate_hz: float) -> NDArray[np.intp]:
+    """Return the indices of the first stamp in each period of 1 / rate."""
+    slack = 0.1 * np.median(np.diff(time)) if len(time) > 1 else 0.0
+    period = np.floor((time - time[0] + slack) * rate_hz)
+    return np.flatnonzero(np.diff(period, prepend=-1.0) > 0)
+
+
+def read_reference(entry: ReferenceEntry, document: Document, span: Span) -> tuple[Reference, bool, list[str]]:
+    """Read the reference; returns it, whether it is geodetic, and warnings. `span`: of the IMUs, s.
+
+    Raises InputError for data and settings that cannot be right.
+    """
+    track, warnings = _track(entry, "reference", document)
+    if entry.position_lag_s:
+        track = _at_position_times(track, entry.position_lag_s)
+    if len(track.time) < 2:
+        raise InputError(f"{track.source.path}: {len(track.time)} row of reference; expected at least two")
+    warnings += stream_checks.check_within(track.source, "reference", track.time, span)
+    with document.at(["reference", "point_m"]):
+        check_lever_arm("point", np.array(entry.point_m))
+    reference = Reference(track.time, track.position, track.velocity, track.attitude, np.array(entry.point_m))
+    return reference, track.geodetic, warnings
+
+
+def _at_position_times(track: Track, lag: float) -> Track:
+    """Interpolate the attitude to the instants of the positions, which are `lag` seconds after it in each row."""
+    time = track.time + lag
+    if track.attitude is None:
+        return replace(track, time=time)
+    inside = (time >= track.time[0]) & (time <= track.time[-1])
+    angles = np.unwrap(track.attitude, axis=0)
+    attitude = np.column_stack([np.interp(time[inside], track.time, angle) for angle in angles.T])
+    return replace(
+        track,
+        time=time[inside],
+        position=track.position[inside],
+        velocity=None if track.velocity is None else track.velocity[inside],
+        attitude=(attitude + np.pi) % (2 * np.pi) - np.pi,
+    )

@@ -1,1 +1,0 @@
-"""Published and measured figures, each as one function that runs the whole chain."""

@@ -1,0 +1,1 @@
+"""Our own tables: measured figures, each by one function that runs the whole chain."""

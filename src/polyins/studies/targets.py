@@ -1,0 +1,61 @@
+"""Our own tables as targets, and all that are installed."""
+
+from __future__ import annotations
+
+import difflib
+from importlib.metadata import entry_points
+
+from polyins.errors import InputError
+from polyins.studies.target import Target
+
+TARGETS = (
+    Target("flights", "polyins.studies.flights:reproduce", datasets=("quadrotor",), seconds=(10, 40)),
+    Target(
+        "wid",
+        "polyins.studies.wid:reproduce",
+        datasets=("wid",),
+        pictures=True,
+        seconds=(42, 60),
+        print_tables="polyins.studies.wid:print_tables",
+    ),
+    Target("array", "polyins.studies.array:reproduce", seconds=(10, 240)),
+    Target("consistency", "polyins.studies.consistency:reproduce"),
+    Target(
+        "split",
+        "polyins.studies.split:reproduce",
+        datasets=("quadrotor", "whu-array"),
+        pictures=True,
+        seconds=(12, 120),
+    ),
+)
+
+GROUP = "polyins.targets"
+"""entry points under which distributions offer tables of targets"""
+SEVERAL = ("all", "figures")
+"""names of many targets: every one, and those with pictures"""
+
+
+def known() -> dict[str, Target]:
+    """Return all targets that are installed, by name: ours first."""
+    offered = [target for entry in sorted(entry_points(group=GROUP), key=_name) for target in entry.load()]
+    return {target.name: target for target in (*TARGETS, *offered)}
+
+
+def _name(entry: object) -> str:
+    return str(getattr(entry, "name", ""))
+
+
+def find(name: str) -> tuple[Target, ...]:
+    """Return the target of that name, or all that a name of several stands for.
+
+    Raises InputError with the nearest known name for an unknown one.
+    """
+    targets = known()
+    if name in SEVERAL:
+        return tuple(target for target in targets.values() if name == "all" or target.pictures)
+    if name not in targets:
+        names = (*targets, *SEVERAL)
+        near = difflib.get_close_matches(name, names, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names)}"
+        raise InputError(f"reproduce: target {name!r} is unknown; {hint}")
+    return (targets[name],)

@@ -1,0 +1,162 @@
+"""What is in a file: streams, rates, gaps, spans, and what looks wrong, ready for JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polyins.checks.stream_checks import FARTHEST_OFF_AXIS_M, GAP_INTERVALS, WHEEL_RATE_RAD_S, check_imu, check_track
+from polyins.errors import InputError
+from polyins.files import find
+from polyins.formats.recognize import data_format
+from polyins.formats.rows import ImuRows, Track
+from polyins.model.recording import Array
+from polyins.model.rig import DEG
+from polyins.reading.guess import Stream, read_stream
+
+Facts = dict[str, Any]
+
+
+def inspect(path: str | Path) -> Facts:
+    """Describe a data file, or a configuration with all its streams.
+
+    Data that could not be navigated with (NaN, unsorted stamps) are described, not refused. Raises InputError if the
+    file cannot be read at all.
+    """
+    kind = data_format(path)
+    if kind == "configuration":
+        return _describe_configuration(path)
+    stream, guesses = read_stream(path)
+    return {**describe(stream), "format": kind, **_problems(stream, guesses)}
+
+
+def describe(stream: Stream) -> Facts:
+    """Describe one stream: rows, span, rate, gaps, stamps, NaN, and what its values say."""
+    facts = {"file": stream.source.path, "kind": "imu" if isinstance(stream, ImuRows) else "positions"}
+    return {**facts, **_timing(stream.time), **(_imu(stream) if isinstance(stream, ImuRows) else _positions(stream))}
+
+
+def listing(facts: Facts, indent: str = "") -> str:
+    """Return facts as indented lines for a reader; what is not known is left out."""
+    lines = []
+    for key, value in facts.items():
+        items = value if isinstance(value, list) and value and isinstance(value[0], dict) else [value]
+        for item in items:
+            if isinstance(item, dict):
+                lines += [f"{indent}{key}:", listing(item, indent + "  ")]
+            elif item not in (None, []):
+                lines.append(f"{indent}{key}: {_in_words(item)}")
+    return "\n".join(lines)
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(_in_words(item) for item in value)
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
+    """Say what `load` would refuse or warn of."""
+    try:
+        if isinstance(stream, ImuRows):
+            found = check_imu(stream, WHEEL_RATE_RAD_S, FARTHEST_OFF_AXIS_M)
+        else:
+            found = check_track(stream, "positions")
+    except InputError as error:
+        return {"problems": [str(error)], "warnings": [*guesses, *stream.warnings]}
+    return {"problems": [], "warnings": [*guesses, *found]}
+
+
+def _describe_configuration(path: str | Path) -> Facts:
+    from polyins.config import kf_gins_configuration, wheel_ins_configuration
+    from polyins.config.yaml_document import read_yaml
+    from polyins.reading.loading import load
+
+    recording = load(path)
+    gnss, reference = recording.gnss, recording.reference
+    document = read_yaml(path)
+    programs = {"wheel-ins": wheel_ins_configuration, "kf-gins": kf_gins_configuration}
+    return {
+        "file": str(find(path)),
+        "kind": "configuration",
+        "format": next((name for name, program in programs.items() if program.recognizes(document)), "polyins"),
+        "name": recording.name,
+        "geodetic": recording.geodetic,
+        "imus": [
+            {"name": stream.name, **_timing(stream.time), **_motion(stream.time, stream.dtheta, stream.dvel)}
+            for stream in recording.imus
+        ],
+        "gnss": _timing(gnss.time) if gnss else None,
+        "reference": _timing(reference.time) if reference else None,
+        "outages": [list(outage) for outage in recording.outages],
+        "warnings": list(recording.warnings),
+    }
+
+
+def _timing(time: Array) -> Facts:
+    steps = np.diff(time[np.isfinite(time)])
+    usual = float(np.median(steps)) if len(steps) else np.nan
+    gaps = np.flatnonzero(steps > GAP_INTERVALS * usual) if usual > 0 else np.array([], dtype=int)
+    worst = gaps[np.argmax(steps[gaps])] if len(gaps) else None
+    return {
+        "rows": len(time),
+        "begin_s": _number(time[0]) if len(time) else None,
+        "end_s": _number(time[-1]) if len(time) else None,
+        "duration_s": _number(time[-1] - time[0]) if len(time) else None,
+        "rate_hz": _number(1.0 / usual) if usual > 0 else None,
+        "gaps": {
+            "count": len(gaps),
+            "largest_s": None if worst is None else _number(steps[worst]),
+            "at_s": None if worst is None else _number(time[worst]),
+        },
+        "repeated_stamps": int(np.sum(steps == 0.0)),
+        "unsorted_stamps": int(np.sum(steps < 0.0)),
+    }
+
+
+def _imu(rows: ImuRows) -> Facts:
+    values = np.column_stack([rows.dtheta, rows.dvel])
+    return {
+        "units": {"gyro": rows.gyro_unit, "accel": rows.accel_unit},
+        "nan_values": int(np.sum(~np.isfinite(values))),
+        **_motion(rows.time, rows.dtheta, rows.dvel),
+    }
+
+
+def _motion(time: Array, dtheta: Array, dvel: Array) -> Facts:
+    """Say what the mean specific force and rate are; the axis that gravity is on points up at rest."""
+    fine = np.isfinite(dtheta).all(axis=1) & np.isfinite(dvel).all(axis=1) & np.isfinite(time)
+    duration = float(np.median(np.diff(time[fine]))) * int(fine.sum()) if fine.sum() > 1 else np.nan
+    if not duration > 0:
+        return {"accel_mean_m_s2": None, "accel_norm_m_s2": None, "gravity_axis": None, "gyro_mean_deg_s": None}
+    force = dvel[fine].sum(axis=0) / duration
+    strongest = int(np.argmax(np.abs(force)))
+    return {
+        "accel_mean_m_s2": [_number(value) for value in force],
+        "accel_norm_m_s2": _number(np.linalg.norm(force)),
+        "gravity_axis": ("+" if force[strongest] > 0 else "-") + "xyz"[strongest],
+        "gyro_mean_deg_s": [_number(value) for value in dtheta[fine].sum(axis=0) / duration / DEG],
+    }
+
+
+def _positions(track: Track) -> Facts:
+    first = track.position[0] / ([DEG, DEG, 1.0] if track.geodetic else 1.0) if len(track.time) else np.full(3, np.nan)
+    std = track.position_std
+    names = ("latitude_deg", "longitude_deg") if track.geodetic else ("north_m", "east_m")
+    return {
+        "geodetic": track.geodetic,
+        "heights": "sea-level" if track.above_sea else "ellipsoidal" if track.geodetic else "local",
+        "first": {name: _number(value) for name, value in zip((*names, "height_m"), first, strict=True)},
+        "median_std_m": None if std is None else [_number(value) for value in np.median(std, axis=0)],
+        "velocity": track.velocity is not None,
+        "attitude": track.attitude is not None,
+        "quality": track.quality or None,
+        "nan_values": int(np.sum(~np.isfinite(track.position))),
+    }
+
+
+def _number(value: Any) -> float | None:
+    """Return a number that JSON knows, to 12 digits."""
+    return float(f"{float(value):.12g}") if np.isfinite(value) else None
