@@ -33,6 +33,8 @@ ROOMS = (
 )
 """in the order in which they may import: only from above"""
 FLOOR = {room: floor for floor, rooms in enumerate(ROOMS) for room in rooms}
+STATES = "polyins.model.states"
+"""the table that the kernels know as well, on the floor above them"""
 PAPERS = len(ROOMS)
 
 
@@ -66,6 +68,8 @@ def room_of(name: str) -> str:
 
 
 def floor_of(name: str) -> int:
+    if name == STATES:
+        return 0
     return PAPERS if room_of(name) == "polyins_papers" else FLOOR[room_of(name)]
 
 

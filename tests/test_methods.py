@@ -9,6 +9,7 @@ from array_recordings import shaken_recording
 from polyins.errors import InputError
 from polyins.model.methods import ARRAY_METHODS, METHODS, find_method
 from polyins.navigate import batch
+from polyins.navigate.state import SHARED_MECHANIZATION, VIRTUAL
 
 
 def test_the_table_has_the_published_array_methods() -> None:
@@ -41,7 +42,7 @@ def test_a_slip_of_the_pen_is_answered_with_the_nearest_name() -> None:
 )
 def test_who_is_in_the_bank_and_who_shares_a_covariance(method: str, members: int, shares: list[list[int]]) -> None:
     run = batch.prepare(shaken_recording(9, 2.1), method)
-    assert len(run.members) == members
-    np.testing.assert_array_equal(run.state.members, shares)
-    assert run.plan.virtual == (method == "imu-fusion")
-    assert run.plan.shared_mechanization == (method == "enav-fusion-shared-mechanization")
+    assert len(run.bank.members) == members
+    np.testing.assert_array_equal(run.plan.spans, shares)
+    assert run.plan.settings[VIRTUAL] == (method == "imu-fusion")
+    assert run.plan.settings[SHARED_MECHANIZATION] == (method == "enav-fusion-shared-mechanization")

@@ -18,12 +18,14 @@ from reference_wheels import N, WheelState, body_matrix, run_reference, with_err
 from rolling_truth import NOISE, RollingTruth, on_body, on_wheel, tilted
 from scipy.spatial.transform import Rotation
 
-from polyins.kernels import bank, share
+from polyins.aiding import kinds
+from polyins.kernels import bank
+from polyins.kernels import covariance as cov
 from polyins.kernels.bank import LANES
 from polyins.model.recording import GnssStream, Recording, RollingOptions, StartOptions
 from polyins.model.rig import Rig
-from polyins.navigate import batch, engine
-from polyins.navigate.modules import ZERO_RATE_STD, ZERO_VELOCITY_STD
+from polyins.navigate import batch, engine, update
+from polyins.navigate.events import ZERO_RATE_STD, ZERO_VELOCITY_STD
 
 ANTENNA = np.array([0.3, -0.1, -0.9])
 WUHAN = np.array([np.radians(30.5278), np.radians(114.3557), 35.0])
@@ -43,30 +45,26 @@ MEMBERS = {
 
 def covariance(run: batch.Prepared) -> list[Array]:
     """One block for each navigator, or one of all if joined."""
-    if run.joined is not None:
+    if len(run.state.joint):
         return [whole(run)]
-    blocks = []
-    for g in run.state.groups[: len(run.state.members)]:
-        share.complete(g)
-        blocks.append(g[share.P : share.P + N * share.STRIDE].reshape(N, share.STRIDE)[:, :N].copy())
-    return blocks
+    for g in run.state.blocks[: len(run.plan.spans)]:
+        cov.complete(g, cov.STRIDE)
+    return [block.copy() for block in covariance_blocks(run)]
 
 
 def whole(run: batch.Prepared) -> Array:
-    """Between updates the upper blocks are in the joined matrix, those of the diagonal in the shares."""
-    assert run.joined is not None
-    P = np.triu(run.joined.whole, 1)
-    for s, g in enumerate(run.state.groups[: len(run.state.members)]):
-        share.complete(g)
-        block = g[share.P : share.P + N * share.STRIDE].reshape(N, share.STRIDE)[:, :N]
-        P[N * s : N * s + N, N * s : N * s + N] = np.triu(block)
+    """Between updates what is right of the diagonal blocks is in the joint matrix, those themselves in the blocks."""
+    P = np.triu(run.state.joint, 1)
+    for s, g in enumerate(run.state.blocks[: len(run.plan.spans)]):
+        cov.complete(g, cov.STRIDE)
+        P[N * s : N * s + N, N * s : N * s + N] = np.triu(covariance_blocks(run)[s])
     return np.asarray(np.triu(P) + np.triu(P, 1).T)
 
 
 def of_each_imu(run: batch.Prepared, field: int, count: int) -> Array:
-    blocks = run.state.blocks
-    lanes = [first for first, _ in run.state.members]
-    return np.array([blocks[i // LANES, field + i % LANES :: LANES][:count] for i in lanes])
+    rows = run.state.rows
+    lanes = [first for first, _ in run.plan.spans]
+    return np.array([rows[i // LANES, field + i % LANES :: LANES][:count] for i in lanes])
 
 
 @dataclass(frozen=True)
@@ -125,34 +123,34 @@ def prepared(way: Drive, method: str) -> tuple[batch.Prepared, list[WheelState]]
             state = replace(state, position=WUHAN + state.position * UP / scale)
         off = np.concatenate([rng.normal(0.0, 0.03, 6), rng.normal(0.0, 0.01, 3), np.zeros(15)])
         state = with_errors(earth, state, off)
-        lane = run.state.members[row, 0]
-        w, lane = run.state.blocks[lane // LANES], lane % LANES
+        lane = run.plan.spans[row, 0]
+        w, lane = run.state.rows[lane // LANES], lane % LANES
         for at, values in (
             (bank.POSITION, state.position), (bank.VELOCITY, state.velocity), (bank.QUATERNION, state.quaternion)
         ):  # fmt: skip
             w[at + lane : at + lane + len(values) * LANES : LANES] = values
         starts.append(state)
-    engine.begin(run.state, run.plan, run.inputs.increments[0], run.state.clock[1], None, rolling=run.rolling)
+    engine.begin(run.navigators, run.inputs.increments[0], float(np.diff(run.inputs.time[:2])[0]))
     return run, starts
 
 
 def both(way: Drive, method: str, **options: Any) -> dict[str, float]:
     """The engine after its last epoch against the reference's run."""
     run, starts = prepared(way, method)
-    std = np.sqrt([np.diag(P) for P in share_blocks(run)])
+    std = np.sqrt([np.diag(P) for P in covariance_blocks(run)])
     run.advance(1, len(run.inputs.time))
     wheels = [0] if method.startswith(("body", "wheel")) else [0, 1]
     gnss, recording = [], way.recording
     if recording.gnss is not None:
         epochs = np.searchsorted(recording.imus[0].time, recording.gnss.time - 1e-4)
         gnss = list(zip(epochs, recording.gnss.position, recording.gnss.position_std, strict=True))
-        assert np.all(run.outputs.fix_status == engine.ACCEPTED)
+        assert np.all(run.outputs.event_status[of_kind(run, kinds.GNSS_POSITION)] == update.ACCEPTED)
     reference = run_reference(
         recording,
         MEMBERS[method.split("/")[0]],
         starts,
         std,
-        joined=run.joined is not None,
+        joined=len(run.state.joint) > 0,
         wheels=wheels,
         spin_bias=[0.0] * len(wheels),
         gnss=gnss,
@@ -161,9 +159,13 @@ def both(way: Drive, method: str, **options: Any) -> dict[str, float]:
     return differences(run, reference)
 
 
-def share_blocks(run: batch.Prepared) -> list[Array]:
-    groups = run.state.groups[: len(run.state.members)]
-    return [g[share.P : share.P + N * share.STRIDE].reshape(N, share.STRIDE)[:, :N] for g in groups]
+def covariance_blocks(run: batch.Prepared) -> list[Array]:
+    blocks = run.state.blocks[: len(run.plan.spans)]
+    return [g[cov.P : cov.P + N * cov.STRIDE].reshape(N, cov.STRIDE)[:, :N] for g in blocks]
+
+
+def of_kind(run: batch.Prepared, kind: int) -> Array:
+    return np.asarray(run.inputs.event_kind == kind)
 
 
 def differences(run: batch.Prepared, reference: dict[str, Any]) -> dict[str, float]:
@@ -185,7 +187,7 @@ def differences(run: batch.Prepared, reference: dict[str, Any]) -> dict[str, flo
         "imu velocity": np.abs(of_each_imu(run, bank.VELOCITY, 3) - reference["imu_velocity"][-1]).max(),
         "imu attitude": np.abs(aligned - reference["imu_quaternion"][-1]).max(),
         "errors": np.abs(of_each_imu(run, bank.ERRORS, 12) - reference["errors"][-1]).max(),
-        "mounting": np.abs(of_each_imu(run, bank.MOUNTING, 3) - reference["mounting"][-1]).max(),
+        "mounting": np.abs(of_each_imu(run, bank.SPEED_SCALE, 3) - reference["mounting"][-1]).max(),
         "covariance": max(relative(p, q) for p, q in zip(P, Q, strict=True)),
     }
     return {name: float(value) for name, value in out.items()}
@@ -262,8 +264,9 @@ def test_a_lying_fix_is_rejected(method: str) -> None:
     gnss = replace(way.recording.gnss, position=position)
     run, _ = prepared(replace(way, recording=replace(way.recording, gnss=gnss)), method)
     run.advance(1, len(run.inputs.time))
-    np.testing.assert_array_equal(np.flatnonzero(run.outputs.fix_status == engine.REJECTED), [4])
-    residual = run.outputs.innovations[:, :3]
+    fixes = of_kind(run, kinds.GNSS_POSITION)
+    np.testing.assert_array_equal(np.flatnonzero(run.outputs.event_status[fixes] == update.REJECTED), [4])
+    residual = run.outputs.innovations[fixes, :3]
     assert residual[4, 0] == pytest.approx(-10.0, abs=0.5)
     assert np.abs(np.delete(residual, 4, axis=0)).max() < 0.5
 

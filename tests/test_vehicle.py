@@ -14,7 +14,7 @@ from polyins.kernels.bank import LANES
 from polyins.model.methods import find_method
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
-from polyins.navigate import batch, modules
+from polyins.navigate import batch, choice
 from polyins.prepare import course
 from polyins.simulation.scenario import Errors
 
@@ -46,10 +46,10 @@ def test_a_later_prediction_is_later() -> None:
 def test_equal_chips_of_a_module_are_one(method: str) -> None:
     recording = drive(chips=3)
     run = batch.prepare(recording, method)
-    assert [last - first for first, last in run.state.members if run.members[first].imu.wheel] == [3] * (
+    assert [last - first for first, last in run.bank.spans if run.bank.members[first].imu.wheel] == [3] * (
         1 if "wheel" in method else 2
     )
-    assert all(first % LANES == 0 for first, _ in run.state.members)
+    assert all(first % LANES == 0 for first, _ in run.bank.spans)
     alone = pi.run(recording, method.replace("/left", "/left1").replace("triple-ins", "triple-ins/left1/right1"))
     together = pi.run(recording, method)
     np.testing.assert_allclose(together.position, alone.position, atol=1e-9)
@@ -157,17 +157,22 @@ def test_the_heading_is_found_from_no_more_of_the_drive_than_it_takes(monkeypatc
     assert ends[1] is None
 
 
-def test_array_methods_are_not_for_vehicles() -> None:
-    with pytest.raises(InputError, match="enav-fusion is for arrays; this rig has wheels"):
-        pi.run(drive(), "enav-fusion")
+def test_a_method_of_arrays_takes_the_imus_on_the_body() -> None:
+    recording = drive()
+    together = pi.run(recording, "enav-fusion")
+    assert set(together.imu_names) == {imu.name for imu in recording.rig.imus if imu.wheel is None}
+    assert off(together, recording)[-1] < 1.5 * off(pi.run(recording, "body-ins"), recording)[-1]
+    wheels = [i for i, imu in enumerate(recording.rig.imus) if imu.wheel is not None]
+    with pytest.raises(InputError, match="enav-fusion needs an IMU on the body; expected one without `wheel`"):
+        pi.run(recording.subset(wheels), "enav-fusion")
 
 
 def test_what_a_rig_allows() -> None:
     recording = drive()
-    assert modules.available(recording.rig) == [
+    assert choice.available(recording.rig) == [
         "wheel-ins", "body-ins", "dual-wheel-ins", "body-wheel-ins", "triple-ins", "multi-wheel-ins"
     ]  # fmt: skip
     left = [i for i, imu in enumerate(recording.rig.imus) if imu.module == "left"]
-    assert modules.available(recording.subset(left).rig) == ["wheel-ins"]
-    with pytest.raises(InputError, match="expected nothing after 'single'"):
+    assert choice.available(recording.subset(left).rig) == ["wheel-ins"]
+    with pytest.raises(InputError, match="single has one covariance block: expected several to be joined"):
         find_method("single/centralized")

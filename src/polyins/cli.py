@@ -122,7 +122,7 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
         settings = loading.read_config(config)
         long = streaming.open_long(settings)
         recording = loading.load_settings(settings) if long is None else long.head
-    if imu is not None and recording.rig.rolling:
+    if imu is not None and recording.rig.has_wheels:
         raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
     name = method or _usual_method(recording, imu)
     index = _imu_index([one.name for one in recording.rig.imus], imu)
@@ -155,7 +155,7 @@ def _print_json(document: Mapping[str, Any]) -> None:
 
 
 def _usual_method(recording: Recording, imu: str | None) -> str:
-    from polyins.navigate.modules import usual_method
+    from polyins.navigate.choice import usual_method
 
     return usual_method(recording.rig) if imu is None else "single"
 

@@ -11,18 +11,17 @@ from numpy.typing import NDArray
 
 from polyins.evaluation.outages import Interval
 from polyins.kernels import fuse
-from polyins.kernels.jit import Array, kernel
+from polyins.kernels.jit import kernel
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import Recording
 from polyins.navigate import batch, engine
-from polyins.navigate.engine import Inputs, Outputs, Plan, State
+from polyins.navigate.state import Inputs, Navigators, Outputs
 
 
 def outage_maxima(recording: Recording, *, velocity: bool, attitude: bool) -> NDArray[np.float64]:
     """Return the maximum horizontal error in each outage, m, where velocity or attitude or both are fed back."""
     run = batch.prepare(recording, "enav-fusion")
-    fixes = run.inputs.fixes if len(run.inputs.fixes) else None
-    run_with_feedback(run.state, run.plan, run.inputs, run.outputs, fixes, run.origin, velocity, attitude)
+    run_with_feedback(run.navigators, run.inputs, run.outputs, velocity, attitude)
     states, time = run.outputs.states, run.inputs.time
     return np.array([_maximum(recording, time, states, outage) for outage in recording.outages])
 
@@ -39,21 +38,13 @@ def _maximum(recording: Recording, time: NDArray[np.float64], states: NDArray[np
 
 
 @kernel
-def run_with_feedback(
-    state: State,
-    plan: Plan,
-    inputs: Inputs,
-    outputs: Outputs,
-    fixes: Array | None,
-    origin: Array | None,
-    velocity: bool,
-    attitude: bool,
-) -> None:
+def run_with_feedback(navigators: Navigators, inputs: Inputs, outputs: Outputs, velocity: bool, attitude: bool) -> None:
     """Take all epochs of an array, and feed the fused velocity, attitude or both back after each."""
+    state = navigators.state
     for k in range(1, len(inputs.time)):
-        engine.run_epochs(state, plan, inputs, outputs, k, k + 1, fixes, None, origin, None, None)
-        for b in range(state.blocks.shape[0]):
+        engine.run(navigators, inputs, outputs, None, k, k + 1)
+        for b in range(state.rows.shape[0]):
             if velocity:
-                fuse.take_fused_velocity(state.blocks[b], state.groups[0])
+                fuse.take_fused_velocity(state.rows[b], state.blocks[0])
             if attitude:
-                fuse.take_fused_attitude(state.blocks[b], state.groups[0])
+                fuse.take_fused_attitude(state.rows[b], state.blocks[0])

@@ -24,7 +24,7 @@ from polyins.errors import InputError
 
 if TYPE_CHECKING:
     from polyins.navigate.batch import Prepared
-    from polyins.navigate.engine import State
+    from polyins.navigate.state import Navigators
 
 Tally = dict[str, int]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -114,51 +114,56 @@ def counting(array: NDArray[np.float64]) -> NDArray[Any]:
 
 def count_steps() -> dict[str, dict[str, Tally]]:
     """Return what each step of Table I does in polyins, by the form of the covariance."""
-    from polyins.kernels import dense, earth, fuse, share, strapdown
+    from polyins.kernels import covariance, dense, earth, fuse, strapdown
+    from polyins.navigate.state import EARTH, Navigators
 
     prepared = prepare("enav-fusion", IMUS)
-    for module in (earth, fuse, share, strapdown):
+    for module in (earth, fuse, covariance, strapdown):
         setattr(module, "math", counting_math())  # noqa: B010
-    plain = prepared.state
-    state = plain._replace(**{name: counting(getattr(plain, name)) for name in COUNTED_ARRAYS})
-    g, w, dt = state.groups[0], state.blocks[0], Counted(1.0 / RATE_HZ)
+    plain = prepared.navigators
+    state = plain.state._replace(
+        **{name: counting(getattr(plain.state, name)) for name in ("rows", "blocks", "scalars")}
+    )
+    work = plain.work._replace(**{name: counting(getattr(plain.work, name)) for name in COUNTED_WORK})
+    block, rows, dt = state.blocks[0], state.rows, Counted(1.0 / RATE_HZ)
+    model, sums, reference = work.covariance[0], work.sums[0], state.scalars[EARTH : EARTH + 5]
     lanes, imus = 8, IMUS
-    model = count(share.error_model, g, dt, state.near)
+    transition = count(covariance.error_model, block, model, dt, reference)
     squares, shaping = (counting(array) for array in dense.workspace())
-    covariance = count(_propagate_covariance, squares)
+    products = count(_propagate_covariance, squares)
     # all of the dense prediction but Phi P Phi' + Qd
-    rest = _less(count(dense.predict, g, dt, squares, shaping), covariance)
-    update = count_update(state)
+    rest = _less(count(dense.predict, block, model, dt, squares, shaping), products)
+    update = count_update(Navigators(state, plain.plan, work))
     common = {
-        "mechanization": _per(count(_mechanize, w, dt, state.near, strapdown), lanes),
+        "mechanization": _per(count(_mechanize, rows[0], dt, reference, strapdown), lanes),
         "design": update["design"],
         "gain": update["gain"],
         "covariance_update": update["covariance_update"],
         "residual": _per(update["residual"], imus),
         "correction": _per(update["correction"], imus),
         "feedback": _per(update["feedback"], imus),
-        "measurement_fusion": _per(count(fuse.fuse_measurements, state.blocks, 0, imus, g, dt), imus),
-        "solution_fusion": _per(count(_fuse_solutions, state, fuse, dt), imus),
+        "measurement_fusion": _per(count(_fuse_measurements, rows, sums, block, dt, fuse), imus),
+        "solution_fusion": _per(count(fuse.fuse_states, rows, 0, imus, block, sums, dt), imus),
     }
-    structured = count(share.predict, g, dt)
+    structured = count(covariance.predict, block, model, dt)
     return {
         "dense": {
             **common,
-            "transition": model,
+            "transition": transition,
             "noise": rest,
-            "covariance": covariance,
-            "prediction": _sum(model, rest, covariance),
+            "covariance": products,
+            "prediction": _sum(transition, rest, products),
         },
         "structured": {
             **common,
-            "transition": model,
+            "transition": transition,
             "noise_and_covariance": structured,
-            "prediction": _sum(model, structured),
+            "prediction": _sum(transition, structured),
         },
     }
 
 
-COUNTED_ARRAYS = ("blocks", "groups", "measurements", "near")
+COUNTED_WORK = ("covariance", "sums", "updates", "measurement")
 
 
 def prepare(method: str, imus: int) -> Prepared:
@@ -177,10 +182,9 @@ def _mechanize(w: NDArray[Any], dt: Counted, near: NDArray[Any], strapdown: Any)
     strapdown.mechanize(w, dt, Counted(1.0 / 12.0), near)
 
 
-def _fuse_solutions(state: State, fuse: Any, dt: Counted) -> None:
-    for block in state.blocks:
-        fuse.project_to_origin(block, dt)
-    fuse.fuse_states(state.blocks, 0, IMUS, state.groups[0])
+def _fuse_measurements(rows: NDArray[Any], sums: NDArray[Any], block: NDArray[Any], dt: Counted, fuse: Any) -> None:
+    fuse.add_all(rows, 0, IMUS, sums)
+    fuse.finish_measurements(sums, block, dt)
 
 
 def _propagate_covariance(squares: NDArray[Any]) -> None:
@@ -191,29 +195,49 @@ def _propagate_covariance(squares: NDArray[Any]) -> None:
     phi @ p @ phi.T + q
 
 
-def count_update(state: State) -> dict[str, Tally]:
+def count_update(bank: Navigators) -> dict[str, Tally]:
     """Return what the parts of an update by a position do; residual, correction and feedback are for all IMUs."""
-    from polyins.aiding import gnss
-    from polyins.kernels import earth, fuse, kalman, share, strapdown
+    from polyins.aiding import kinds, measurement, point, vehicle_attitude
+    from polyins.kernels import covariance, earth, fuse, kalman, strapdown, vehicle
+    from polyins.kernels.covariance import STRIDE
+    from polyins.navigate import update
 
-    g, m, imus = state.groups[0], state.measurements[0], IMUS
-    m[kalman.R : kalman.R + 3] = counting(np.full(3, 1e-4))
-    metres = g[share.METRIC : share.METRIC + 3]
-    fix = counting(np.array([*map(float, g[share.POSITION : share.POSITION + 3]), 1e-4, 1e-4, 1e-4]))
-    earth.metric(g[share.POSITION : share.POSITION + 3], True, metres)
+    state, _, work = bank
+    block, rows, own, fix = state.blocks[0], state.rows, work.updates[0], work.measurement
+    fix[measurement.KIND], fix[measurement.GEODETIC] = kinds.GNSS_POSITION, 1.0
+    place = block[covariance.POSITION : covariance.POSITION + 3]
+    fix[measurement.VALUE : measurement.VALUE + 3] = place
+    fix[measurement.PLACE] = Counted(0.3)
+    own[kalman.R : kalman.R + 3] = counting(np.full(3, 1e-4))
+    metres = fix[measurement.METRIC : measurement.METRIC + 3]
+    earth.metric(place, True, metres)
+    vehicle.put_matrix(block, covariance.VEHICLE, vehicle.matrix_at(block, covariance.MATRIX))
+    level = vehicle.lent_matrix(state.blocks, -1)
+
+    def design() -> None:
+        point.design(block, rows[0], 0, fix, own)
+        vehicle_attitude.add_own(block, rows[0], 0, own)
+
+    def residuals() -> None:
+        for i in range(IMUS):
+            point.residual(rows[i // 8], i % 8, level, fix)
+
+    def corrections() -> None:
+        for i in range(IMUS):
+            update.member_correction(rows[i // 8], i % 8, own, STRIDE)
 
     def feedback() -> None:
-        fuse.correct_members(state.blocks, 0, imus, metres)
-        for w in state.blocks:
-            strapdown.update_matrix(w)
-            strapdown.update_sensitivity(w)
+        fuse.correct_members(rows, 0, IMUS, metres, STRIDE)
+        for lanes in rows:
+            strapdown.update_matrix(lanes)
+            strapdown.update_sensitivity(lanes)
 
     return {
-        "design": count(gnss.position_design, g, m),
-        "residual": count(gnss.position_residuals, state.blocks, 0, imus, fix, metres, True, m),
-        "gain": count(kalman.gain, g, m),
-        "covariance_update": count(kalman.update_covariance, g, m),
-        "correction": count(gnss.residuals_to_corrections, state.blocks, 0, imus, m),
+        "design": count(design),
+        "residual": count(residuals),
+        "gain": count(kalman.gain, block, own, STRIDE),
+        "covariance_update": count(kalman.update_covariance, block, own, STRIDE),
+        "correction": count(corrections),
         "feedback": count(feedback),
     }
 
@@ -235,8 +259,9 @@ EXECUTED = ("mechanization", "prediction", "gain", "feedback", "measurement_fusi
 
 
 def count_executions(method: str, imus: int) -> dict[str, int]:
-    """Return how often the steps of Table II are done in one second with one fix, once for each IMU or share."""
-    from polyins.kernels import bank, fuse, kalman, share, strapdown
+    """Return how often the steps of Table II are done in one second with one fix, once for each IMU or block."""
+    from polyins.kernels import bank, covariance, fuse, kalman, strapdown
+    from polyins.navigate.state import NEXT_EVENT, TIME
 
     tally = dict.fromkeys(EXECUTED, 0)
 
@@ -253,15 +278,16 @@ def count_executions(method: str, imus: int) -> dict[str, int]:
     prepared = prepare(method, imus)
     watched: list[tuple[Any, str, Any]] = []
     watch(strapdown, "mechanize", "mechanization", lambda w, *_: int((w[bank.WEIGHT : bank.WEIGHT + 8] > 0.0).sum()))
-    watch(share, "predict", "prediction", lambda *_: 1)
+    watch(covariance, "predict", "prediction", lambda *_: 1)
     watch(kalman, "gain", "gain", lambda *_: 1)
-    watch(fuse, "correct_members", "feedback", lambda _, first, last, __: int(last - first))
+    watch(fuse, "correct_members", "feedback", lambda _, first, last, *__: int(last - first))
     watch(fuse, "finish_measurements", "measurement_fusion", lambda *_: imus)
     watch(fuse, "finish_states", "solution_fusion", lambda *_: imus)
-    fix = float(prepared.inputs.fix_time[prepared.inputs.fix_time > prepared.inputs.time[0] + 0.01][0])
-    first = int(np.searchsorted(prepared.inputs.time, fix)) - 1
-    prepared.state.counters[0] = int(np.searchsorted(prepared.inputs.fix_time, fix))
-    prepared.state.clock[0] = prepared.inputs.time[first - 1]
+    time, due = prepared.inputs.time, prepared.inputs.event_time
+    fix = float(due[due > time[0] + 0.01][0])
+    first = int(np.searchsorted(time, fix)) - 1
+    prepared.state.scalars[NEXT_EVENT] = int(np.searchsorted(due, fix))
+    prepared.state.scalars[TIME] = time[first - 1]
     prepared.advance(first, first + int(RATE_HZ))
     for module, name, original in watched:
         setattr(module, name, original)

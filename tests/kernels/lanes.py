@@ -7,9 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 from reference_filter import Earth, Ellipsoid, FlatEarth, State
 from scipy.spatial.transform import Rotation
 
-from polyins.kernels import bank, share, strapdown
+from polyins.kernels import bank, strapdown
+from polyins.kernels import covariance as cov
 from polyins.kernels.bank import LANES
+from polyins.kernels.covariance import STRIDE
 from polyins.model.rig import NoiseGrade
+from polyins.navigate.state import block_size
 
 Array = NDArray[np.float64]
 
@@ -49,12 +52,12 @@ def attitudes(w: Array) -> Rotation:
 
 
 def covariance(g: Array) -> Array:
-    share.complete(g)
-    return g[share.P : share.P + 21 * share.STRIDE].reshape(21, share.STRIDE)[:, :21].copy()
+    cov.complete(g, STRIDE)
+    return g[cov.P : cov.P + 21 * STRIDE].reshape(21, STRIDE)[:, :21].copy()
 
 
 def set_covariance(g: Array, P: Array) -> None:
-    g[share.P : share.P + 21 * share.STRIDE].reshape(21, share.STRIDE)[:, :21] = P
+    g[cov.P : cov.P + 21 * STRIDE].reshape(21, STRIDE)[:, :21] = P
 
 
 SIZES = np.repeat([10.0, 0.5, 0.02, 1e-4, 0.02, 1e-3, 1e-3], 3)
@@ -78,19 +81,19 @@ def group(
     state: State, rate: ArrayLike = (0.0, 0.0, 0.0), force: ArrayLike = (0.0, 0.0, 0.0), noise: NoiseGrade | None = None
 ) -> Array:
     """A row of groups at a state, driven by a rate, a specific force and the noise of one member."""
-    g = np.zeros(share.SIZE)
-    g[share.POSITION : share.POSITION + 3] = state.position
-    g[share.VELOCITY : share.VELOCITY + 3] = state.velocity
-    g[share.QUATERNION : share.QUATERNION + 4] = state.quaternion
-    g[share.MATRIX : share.MATRIX + 9] = state.C.ravel()
-    g[share.RATE : share.RATE + 3] = rate
-    g[share.FORCE : share.FORCE + 3] = force
+    g = np.zeros(block_size(STRIDE))
+    g[cov.POSITION : cov.POSITION + 3] = state.position
+    g[cov.VELOCITY : cov.VELOCITY + 3] = state.velocity
+    g[cov.QUATERNION : cov.QUATERNION + 4] = state.quaternion
+    g[cov.MATRIX : cov.MATRIX + 9] = state.C.ravel()
+    g[cov.RATE : cov.RATE + 3] = rate
+    g[cov.FORCE : cov.FORCE + 3] = force
     if noise is not None:
         std = [noise.gyro_bias_std, noise.accel_bias_std, noise.gyro_scale_std, noise.accel_scale_std]
-        g[share.GYRO_PSD : share.GYRO_PSD + 3] = noise.angle_random_walk**2
-        g[share.ACCEL_PSD : share.ACCEL_PSD + 3] = noise.velocity_random_walk**2
-        g[share.ERROR_PSD : share.ERROR_PSD + 12] = 2.0 * np.concatenate(std) ** 2 / noise.correlation_time
-        g[share.DECAY : share.DECAY + 12] = 1.0 / noise.correlation_time
+        g[cov.GYRO_PSD : cov.GYRO_PSD + 3] = noise.angle_random_walk**2
+        g[cov.ACCEL_PSD : cov.ACCEL_PSD + 3] = noise.velocity_random_walk**2
+        g[cov.ERROR_PSD : cov.ERROR_PSD + 12] = 2.0 * np.concatenate(std) ** 2 / noise.correlation_time
+        g[cov.DECAY : cov.DECAY + 12] = 1.0 / noise.correlation_time
     return g
 
 

@@ -16,8 +16,11 @@ from reference_filter import (
 )
 from scipy.spatial.transform import Rotation
 
-from polyins.kernels import bank, earth, fuse, share, strapdown
+from polyins.kernels import bank, earth, fuse, strapdown
+from polyins.kernels import covariance as cov
 from polyins.kernels.bank import LANES
+from polyins.kernels.covariance import STRIDE
+from polyins.navigate.state import block_size
 
 
 def around(place: State, spread: float, seed: int) -> list[State]:
@@ -33,11 +36,12 @@ def around(place: State, spread: float, seed: int) -> list[State]:
     ]
 
 
-def empty_group(weights: float) -> Array:
-    """A share, or the merged state, whose members' weights add up to so much."""
-    g = np.zeros(share.SIZE)
-    g[share.WEIGHTS] = weights
-    return g
+def empty_block() -> Array:
+    return np.zeros(block_size(STRIDE))
+
+
+def sums() -> Array:
+    return np.zeros(fuse.SUMS)
 
 
 def bank_of(states: list[State]) -> Array:
@@ -57,17 +61,17 @@ def test_states_are_seen_at_the_array_origin(on: Earth) -> None:
     place, dt = random_state(rng, on), 0.01
     states, arms = around(place, 0.1, 2), rng.uniform(-1.0, 1.0, (8, 3))
     rates, w = rng.uniform(-2.0, 2.0, (8, 3)), bank_of(states)
-    put(w, bank.TO_ORIGIN, arms)
+    put(w, bank.TO_POINT, arms)
     put(w, bank.DTHETA, rates * dt)
     near = near_of(on, place.position[0])
     earth.evaluate(w, *near[1:4]) if near[0] else earth.evaluate_plane(w, near[4])
-    fuse.project_to_origin(w, dt)
+    fuse.project_to_point(w, dt)
     everything = list(zip(states, rates, arms, strict=True))
     positions = np.array([move_position(on, s, arm) for s, _, arm in everything])
     velocities = np.array([move_velocity(on, s, rate, arm) for s, rate, arm in everything])
     metres = on.metres_per_unit(place.position)
-    assert np.abs((get(w, bank.ORIGIN_POSITION, 3) - positions) * metres).max() < 1e-8
-    np.testing.assert_allclose(get(w, bank.ORIGIN_VELOCITY, 3), velocities, rtol=1e-13, atol=1e-12)
+    assert np.abs((get(w, bank.POINT_POSITION, 3) - positions) * metres).max() < 1e-8
+    np.testing.assert_allclose(get(w, bank.POINT_VELOCITY, 3), velocities, rtol=1e-13, atol=1e-12)
     assert np.abs(velocities - [s.velocity for s in states]).max() > 0.5
 
 
@@ -79,53 +83,57 @@ def test_the_mean_attitude_lies_between_its_members_at_any_heading_and_pitch(hea
     pairs = Rotation.concatenate([Rotation.from_rotvec(apart) * middle] * 2)
     quaternions = pairs.as_quat(scalar_first=True)
     quaternions *= np.sign(quaternions @ middle.as_quat(scalar_first=True))[:, None]
-    w, g = block(), empty_group(1.0)
+    w, g = block(), empty_block()
     put(w, bank.QUATERNION, quaternions)
-    fuse.fuse_states(w[None], 0, LANES, g)
-    merged = Rotation.from_matrix(g[share.MATRIX : share.MATRIX + 9].reshape(3, 3))
+    fuse.fuse_states(w[None], 0, LANES, g, sums(), 0.01)
+    merged = Rotation.from_matrix(g[cov.MATRIX : cov.MATRIX + 9].reshape(3, 3))
     assert (merged.inv() * middle).magnitude() < 1e-15
-    assert np.linalg.norm(g[share.QUATERNION : share.QUATERNION + 4]) == pytest.approx(1.0, abs=1e-15)
+    assert np.linalg.norm(g[cov.QUATERNION : cov.QUATERNION + 4]) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_means_run_over_the_lanes_of_a_share_across_blocks() -> None:
+def test_means_run_over_the_lanes_of_a_block_across_rows() -> None:
     """Eleven of sixteen lanes; whatever stands in those without an IMU has no weight."""
     rng = np.random.default_rng(3)
-    blocks, g = np.array([block(), block()]), empty_group(11.0 / 20.0)
+    blocks, g = np.array([block(), block()]), empty_block()
     positions = np.array([0.5, 2.0, 30.0]) + 1e-7 * rng.standard_normal((16, 3))
     velocities = rng.standard_normal((16, 3))
     velocities[11:] = 1e6
-    weights = np.where(np.arange(16) < 11, 1.0 / 20.0, 0.0)[:, None]
+    weights = np.where(np.arange(16) < 11, 1.0 / 11.0, 0.0)[:, None]
     for b, w in enumerate(blocks):
         lanes = slice(LANES * b, LANES * b + LANES)
         put(w, bank.WEIGHT, weights[lanes])
-        put(w, bank.ORIGIN_POSITION, positions[lanes])
-        put(w, bank.ORIGIN_VELOCITY, velocities[lanes])
+        put(w, bank.POINT_POSITION, positions[lanes])
+        put(w, bank.POINT_VELOCITY, velocities[lanes])
         put(w, bank.DTHETA, 0.01 * velocities[lanes])
         put(w, bank.DVEL, -0.01 * velocities[lanes])
-    fuse.fuse_states(blocks, 0, 11, g)
-    fuse.fuse_measurements(blocks, 0, 11, g, 0.005)
+    own = sums()
+    fuse.add_all(blocks, 0, 11, own)
+    fuse.finish_states(own, g)
+    fuse.finish_measurements(own, g, 0.005)
     mean = velocities[:11].mean(axis=0)
-    np.testing.assert_allclose(g[share.POSITION : share.POSITION + 3], positions[:11].mean(axis=0), rtol=1e-15)
-    np.testing.assert_allclose(g[share.VELOCITY : share.VELOCITY + 3], mean, atol=1e-14)
-    np.testing.assert_allclose(g[share.RATE : share.RATE + 3], 2.0 * mean, atol=1e-14)
-    np.testing.assert_allclose(g[share.FORCE : share.FORCE + 3], -2.0 * mean, atol=1e-14)
+    np.testing.assert_allclose(g[cov.POSITION : cov.POSITION + 3], positions[:11].mean(axis=0), rtol=1e-15)
+    np.testing.assert_allclose(g[cov.VELOCITY : cov.VELOCITY + 3], mean, atol=1e-14)
+    np.testing.assert_allclose(g[cov.RATE : cov.RATE + 3], 2.0 * mean, atol=1e-14)
+    np.testing.assert_allclose(g[cov.FORCE : cov.FORCE + 3], -2.0 * mean, atol=1e-14)
 
 
 def test_one_imu_is_itself_at_its_own_place() -> None:
-    w, g = block(Rotation.from_euler("ZYX", [170.0, 60.0, 5.0], degrees=True), (0.5, 2.0, 30.0)), empty_group(0.125)
-    w[bank.ORIGIN_POSITION : bank.ORIGIN_POSITION + 6 * LANES] = np.nan
-    fuse.fuse_states(w[None], 3, 4, g)
-    np.testing.assert_array_equal(g[share.POSITION : share.POSITION + 3], [0.5, 2.0, 30.0])
-    np.testing.assert_array_equal(g[share.QUATERNION : share.QUATERNION + 4], get(w, bank.QUATERNION, 4)[3])
+    w, g = block(Rotation.from_euler("ZYX", [170.0, 60.0, 5.0], degrees=True), (0.5, 2.0, 30.0)), empty_block()
+    w[bank.POINT_POSITION : bank.POINT_POSITION + 6 * LANES] = np.nan
+    fuse.fuse_states(w[None], 3, 4, g, sums(), 0.01)
+    np.testing.assert_array_equal(g[cov.POSITION : cov.POSITION + 3], [0.5, 2.0, 30.0])
+    np.testing.assert_array_equal(g[cov.QUATERNION : cov.QUATERNION + 4], get(w, bank.QUATERNION, 4)[3])
 
 
 def test_equal_members_average_to_themselves_exactly() -> None:
     """Three thirds do not add up to one in binary; a mean of offsets does not need them to."""
-    w, g = block(), empty_group(1.0)
+    w, g = block(), empty_block()
     put(w, bank.WEIGHT, np.where(np.arange(LANES) < 3, 1.0 / 3.0, 0.0)[:, None])
-    put(w, bank.ORIGIN_POSITION, [0.1, 2.3, 31.7])
-    fuse.fuse_states(w[None], 0, 3, g)
-    np.testing.assert_array_equal(g[share.POSITION : share.POSITION + 3], [0.1, 2.3, 31.7])
+    put(w, bank.POINT_POSITION, [0.1, 2.3, 31.7])
+    own = sums()
+    fuse.add_all(w[None], 0, 3, own)
+    fuse.finish_states(own, g)
+    np.testing.assert_array_equal(g[cov.POSITION : cov.POSITION + 3], [0.1, 2.3, 31.7])
 
 
 @pytest.mark.parametrize("imus", [1, 3, 11])
@@ -169,10 +177,10 @@ def test_corrections_feed_back_as_the_error_states_are_defined() -> None:
     put(w, bank.CORRECTION, dx)
     metres = np.empty(3)
     earth.metric(place.position, True, metres)
-    fuse.correct_members(w[None], 1, 7, metres)
+    fuse.correct_members(w[None], 1, 7, metres, 21)
 
     class Held(Ellipsoid):
-        """One metric for all members of a share."""
+        """One metric for all members of a cov."""
 
         def metres_per_unit(self, position: Array) -> Array:
             return metres

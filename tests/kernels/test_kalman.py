@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 from lanes import SIZES, Array, close_in_sigmas, covariance, random_covariance, set_covariance
 from reference_filter import gain, joseph
 
-from polyins.kernels import kalman, share
+from polyins.kernels import kalman
+from polyins.kernels.covariance import LARGEST, STRIDE
+from polyins.navigate.state import block_size
 
 
 def measurement(H: Array, variances: Array, residual: Array) -> Array:
     m = np.zeros(kalman.SIZE)
-    m[kalman.H : kalman.H + 3 * share.STRIDE].reshape(3, share.STRIDE)[:, :21] = H
+    m[kalman.H : kalman.H + 3 * LARGEST].reshape(3, LARGEST)[:, :21] = H
     m[kalman.R : kalman.R + 3] = variances
     m[kalman.RESIDUAL : kalman.RESIDUAL + 3] = residual
     return m
@@ -30,9 +32,9 @@ def drawn(seed: int) -> tuple[Array, Array, Array, Array]:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_the_update_is_the_textbooks(seed: int) -> None:
     P, H, variances, residual = drawn(seed)
-    g, m = np.zeros(share.SIZE), measurement(H, variances, residual)
+    g, m = np.zeros(block_size(STRIDE)), measurement(H, variances, residual)
     set_covariance(g, P)
-    kalman.gain(g, m)
+    kalman.gain(g, m, STRIDE)
     S = H @ P @ H.T + np.diag(variances)
     K = gain(P, H, np.diag(variances))
     actual = m[kalman.K : kalman.K + 63].reshape(21, 3)
@@ -41,18 +43,18 @@ def test_the_update_is_the_textbooks(seed: int) -> None:
     assert np.abs((actual - K) / SIZES[:, None]).max() < 1e-14 * condition * np.abs(K / SIZES[:, None]).max()
     nis = residual @ np.linalg.solve(S, residual)
     assert kalman.normalized_innovation_squared(m) == pytest.approx(nis, rel=1e-14 * condition + 1e-13)
-    kalman.update_covariance(g, m)
+    kalman.update_covariance(g, m, STRIDE)
     close_in_sigmas(covariance(g), joseph(P, K, H, np.diag(variances)), 1e-13 * condition + 1e-12)
 
 
 def test_only_what_is_measured_is_believed() -> None:
     """Two unit variances average; what is not correlated with them stays."""
-    g, H = np.zeros(share.SIZE), np.eye(3, 21)
+    g, H = np.zeros(block_size(STRIDE)), np.eye(3, 21)
     set_covariance(g, np.eye(21))
     m = measurement(H, np.ones(3), np.array([2.0, 0.0, 0.0]))
-    kalman.gain(g, m)
+    kalman.gain(g, m, STRIDE)
     assert kalman.normalized_innovation_squared(m) == pytest.approx(2.0, rel=1e-15)
-    kalman.update_covariance(g, m)
+    kalman.update_covariance(g, m, STRIDE)
     np.testing.assert_allclose(covariance(g), np.diag([0.5] * 3 + [1.0] * 18), atol=1e-16)
 
 
@@ -61,13 +63,13 @@ def test_only_what_is_measured_is_believed() -> None:
 def test_exact_measurements_leave_p_symmetric_and_positive(seed: int) -> None:
     """A hundred nearly perfect fixes of a very uncertain state: what breaks the short form P - K H P."""
     rng = np.random.default_rng(seed)
-    P, g = 1e4 * random_covariance(rng), np.zeros(share.SIZE)
+    P, g = 1e4 * random_covariance(rng), np.zeros(block_size(STRIDE))
     set_covariance(g, P)
     for _ in range(100):
         H = np.hstack([np.eye(3), np.zeros((3, 3)), rng.standard_normal((3, 3)), np.zeros((3, 12))])
         m = measurement(H, np.full(3, 1e-6), np.zeros(3))
-        kalman.gain(g, m)
-        kalman.update_covariance(g, m)
+        kalman.gain(g, m, STRIDE)
+        kalman.update_covariance(g, m, STRIDE)
     after = covariance(g)
     np.testing.assert_array_equal(after, after.T)
     sigma = np.sqrt(np.diag(after))

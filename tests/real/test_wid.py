@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from polyins.model.methods import find_method
-from polyins.navigate.modules import choose
+from polyins.navigate.choice import choose
 from polyins.reading import datasets
 from polyins.studies import wid
 

@@ -11,7 +11,7 @@ from polyins.evaluation.errors import compare_to_reference
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.methods import find_method
 from polyins.model.recording import Reference
-from polyins.navigate.modules import choose
+from polyins.navigate.choice import choose
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Board, Errors, Scenario
@@ -50,7 +50,7 @@ def test_the_runs_are_those_of_the_paper(short):
     for name, labels in CONFIGURATIONS.items():
         every = Counter(chip for chips in chips_of(labels) for chip in chips)
         assert len(set(every.values())) == 1, name
-        assert {choose(find_method(label), short.rig).navigate for label in labels} == {
+        assert {choose(find_method(label), short.rig).blocks for label in labels} == {
             tuple((([imu.name for imu in short.rig.imus]).index(chip),) for chip in chips) for chips in chips_of(labels)
         }
     few = Counter(chip for labels in FEW.values() for chips in chips_of(labels) for chip in chips)

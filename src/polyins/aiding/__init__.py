@@ -1,1 +1,4 @@
-"""Measurements that aid the bank, one file each: what they predict, how they depend on the error states."""
+"""Measurements that aid the bank, one file each: what they predict and how they depend on the error states.
+
+`kinds` is their table.
+"""

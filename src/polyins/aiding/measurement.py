@@ -1,100 +1,58 @@
-"""One measurement of one share, whatever its kind: design matrix, variances, residuals; and what a correction changes.
-
-`Rolling.given` says which measurement it is.
-"""
+"""A measurement while it is applied: what its event says, and where and when that is."""
 
 from __future__ import annotations
 
-from polyins.aiding import reference_point, standstill, vehicle_attitude, wheel_speed
-from polyins.aiding.rolling import (
-    AT_END,
-    G_DT,
-    G_DURATION,
-    G_KNOWN,
-    G_LATERAL,
-    G_METRES,
-    G_POINT,
-    G_SPEED,
-    G_VARIANCE,
-    KIND,
-    POINT,
-    SPEED,
-    ZERO_VELOCITY,
-    Rolling,
-)
-from polyins.kernels import bank, earth, fuse, kalman, share, strapdown, vehicle
-from polyins.kernels.bank import LANES
+from polyins.kernels import kalman, vehicle
+from polyins.kernels.covariance import LARGEST
 from polyins.kernels.jit import Array, scalar_kernel
+from polyins.kernels.layout import Layout
+
+_layout = Layout()
+_take = _layout.take
+
+VALUE = _take(8)  # what the event says, see the files of the kinds
+VARIANCE = _take(3)  # not positive: that component is not measured
+KIND = _take(1)
+DT = _take(1)  # seconds over which the last corrected increments were measured
+GEODETIC = _take(1)  # whether positions are latitude, longitude and height
+METRIC = _take(3)  # metres north, east, down per unit of each coordinate
+
+SIZE = _layout.size
+
+PLACE = VALUE + 3
+"""where the kinds that measure a point of the vehicle keep its place, in vehicle axes, m"""
 
 
 @scalar_kernel
-def update_derived(blocks: Array, groups: Array, members: Array, rolling: Rolling, dt: float) -> None:
-    """Bring everything that follows from the navigation states up to date."""
-    for b in range(blocks.shape[0]):
-        strapdown.update_matrix(blocks[b])
-        strapdown.update_sensitivity(blocks[b])
-    fuse.fuse_shares(blocks, groups, members, dt)
-    vehicle.merge(blocks, groups, members, rolling.lenders, rolling.silent)
+def unit(k: int) -> vehicle.Three:
+    """Return the k-th unit vector."""
+    return 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
 
 
 @scalar_kernel
-def _residual(w: Array, lane: int, lent: vehicle.Matrix, rolling: Rolling, near: Array) -> vehicle.Three:
-    given = rolling.given
-    kind = given[KIND]
-    if kind == SPEED:
-        if rolling.settings[AT_END] != 0.0:
-            return wheel_speed.residual_at_end(w, lane, lent, given[G_LATERAL], given[G_SPEED], given[G_DT])
-        return wheel_speed.residual_of_window(w, lane, given[G_SPEED], given[G_DURATION])
-    if kind == POINT:
-        known, point = given[G_KNOWN : G_KNOWN + 3], given[G_POINT : G_POINT + 3]
-        metres = given[G_METRES : G_METRES + 3]
-        return reference_point.residual(w, lane, lent, point, known, metres, near[0] != 0.0)
-    if kind == ZERO_VELOCITY:
-        return standstill.velocity_residual(w, lane)
-    return standstill.rate_residual(w, lane, given[G_DURATION])
+def put_column(update: Array, column: int, values: vehicle.Three) -> None:
+    """Write a column of the design matrix."""
+    for a in range(kalman.ROWS):
+        update[kalman.H + a * LARGEST + column] = values[a]
 
 
 @scalar_kernel
-def _design(g: Array, w: Array, lane: int, rolling: Rolling, m: Array) -> None:
-    given = rolling.given
-    kind = given[KIND]
-    if kind == SPEED:
-        wheel_speed.design(g, w, lane, given[G_LATERAL], given[G_SPEED], m)
-    elif kind == POINT:
-        reference_point.design(g, w, lane, given[G_POINT : G_POINT + 3], m)
-    elif kind == ZERO_VELOCITY:
-        standstill.velocity_design(m)
-    else:
-        standstill.rate_design(g, m)
+def put_turn(update: Array, k: int, values: vehicle.Three) -> None:
+    """Write what a small rotation of the vehicle about the k-th axis of n does to the measurement."""
+    for a in range(kalman.ROWS):
+        update[kalman.TURN + 3 * a + k] = values[a]
 
 
 @scalar_kernel
-def measure(s: int, blocks: Array, groups: Array, members: Array, near: Array, rolling: Rolling, m: Array) -> None:
-    """Write design matrix, variances and residuals of a share: each member's own, and their mean."""
-    kind = rolling.given[KIND]
-    g = groups[s]
-    first, last = members[s, 0], members[s, 1]
-    w, lane = blocks[first // LANES], first % LANES
-    metres = rolling.given[G_METRES : G_METRES + 3]
-    earth.metric(g[share.POSITION : share.POSITION + 3], near[0] != 0.0, metres)
-    _design(g, w, lane, rolling, m)
-    if kind in (SPEED, POINT):
-        vehicle_attitude.add_own(g, w, lane, m)
-    lent = vehicle.lent_matrix(groups, rolling.lenders[s])
-    for a in range(3):
-        m[kalman.R + a] = rolling.noise[s, a] if kind == SPEED else rolling.given[G_VARIANCE + a]
-        m[kalman.RESIDUAL + a] = 0.0
-    for i in range(first, last):
-        z = _residual(blocks[i // LANES], i % LANES, lent, rolling, near)
-        for a in range(3):
-            blocks[i // LANES, bank.RESIDUAL + a * LANES + i % LANES] = z[a]
-            m[kalman.RESIDUAL + a] += z[a] / (last - first)
+def put_row(update: Array, column: int, row: int, values: vehicle.Three) -> None:
+    """Write three numbers of one row of the design matrix from a column on."""
+    h = kalman.H + row * LARGEST + column
+    update[h], update[h + 1], update[h + 2] = values
 
 
 @scalar_kernel
-def feed_back(s: int, blocks: Array, groups: Array, members: Array, near: Array) -> None:
-    """Apply the correction of each member of a share to its state."""
-    g = groups[s]
-    metres = g[share.METRIC : share.METRIC + 3]
-    earth.metric(g[share.POSITION : share.POSITION + 3], near[0] != 0.0, metres)
-    fuse.correct_members(blocks, members[s, 0], members[s, 1], metres)
+def put_skew(update: Array, column: int, x: float, y: float, z: float) -> None:
+    """Write (x, y, z) x into three columns of the design matrix."""
+    put_row(update, column, 0, (0.0, -z, y))
+    put_row(update, column, 1, (z, 0.0, -x))
+    put_row(update, column, 2, (-y, x, 0.0))

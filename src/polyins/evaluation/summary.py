@@ -212,7 +212,7 @@ def figure(summary: Document | None) -> float | None:
 def on_wheels(summary: Mapping[str, Any]) -> bool:
     """Return whether wheels aided the run; of a method that is not known, as in a solution from elsewhere, no."""
     row = METHODS.get(summary["method"].split("/")[0])
-    return row is not None and row.rolling
+    return row is not None and row.for_wheels
 
 
 def _gnss(innovations: Innovations) -> Document:

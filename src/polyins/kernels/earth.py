@@ -17,7 +17,7 @@ from polyins.kernels.bank import (
     TO_LONGITUDE,
     TRANSPORT_RATE,
 )
-from polyins.kernels.jit import Array, formula, kernel
+from polyins.kernels.jit import Array, formula, kernel, scalar_kernel
 
 A = 6378137.0
 """semi-major axis, m"""
@@ -62,17 +62,17 @@ def metric(position: Array, geodetic: bool, metres: Array) -> None:
 
 
 @kernel
-def evaluate(w: Array, latitude: float, sine: float, cosine: float) -> None:
+def evaluate(lanes: Array, latitude: float, sine: float, cosine: float) -> None:
     """Evaluate the earth for each IMU of a block at AT_POSITION, AT_VELOCITY.
 
     `latitude` is one near all of them (within 1e-3 rad), with its sine and cosine: the sines of the others follow
     from the addition theorem to rounding, without a call that would stop the loop from vectorizing.
     """
     for i in range(LANES):
-        d = w[AT_POSITION + i] - latitude
-        height = w[AT_POSITION + 2 * LANES + i]
-        v_n = w[AT_VELOCITY + i]
-        v_e = w[AT_VELOCITY + LANES + i]
+        d = lanes[AT_POSITION + i] - latitude
+        height = lanes[AT_POSITION + 2 * LANES + i]
+        v_n = lanes[AT_VELOCITY + i]
+        v_e = lanes[AT_VELOCITY + LANES + i]
         d2 = d * d
         sin_d = d * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0)))
         cos_d = 1.0 - d2 * (0.5 - d2 * (1.0 / 24.0))
@@ -88,25 +88,33 @@ def evaluate(w: Array, latitude: float, sine: float, cosine: float) -> None:
         per_north = root * w2 * (inverse * east * c)
         per_east = root * (inverse * north * c)
         secant = inverse * north * east
-        w[GRAVITY + i] = normal_gravity(s2, height)
-        w[EARTH_RATE + i] = EARTH_RATE_RAD_S * c
-        w[EARTH_RATE + LANES + i] = -EARTH_RATE_RAD_S * s
-        w[TRANSPORT_RATE + i] = v_e * per_east
-        w[TRANSPORT_RATE + LANES + i] = -v_n * per_north
-        w[TRANSPORT_RATE + 2 * LANES + i] = -v_e * per_east * s * secant
-        w[TO_LATITUDE + i] = per_north
-        w[TO_LONGITUDE + i] = per_east * secant
+        lanes[GRAVITY + i] = normal_gravity(s2, height)
+        lanes[EARTH_RATE + i] = EARTH_RATE_RAD_S * c
+        lanes[EARTH_RATE + LANES + i] = -EARTH_RATE_RAD_S * s
+        lanes[TRANSPORT_RATE + i] = v_e * per_east
+        lanes[TRANSPORT_RATE + LANES + i] = -v_n * per_north
+        lanes[TRANSPORT_RATE + 2 * LANES + i] = -v_e * per_east * s * secant
+        lanes[TO_LATITUDE + i] = per_north
+        lanes[TO_LONGITUDE + i] = per_east * secant
+
+
+@scalar_kernel
+def move_reference(earth_reference: Array, latitude: float) -> None:
+    """Make a latitude the one near which the earth is evaluated."""
+    earth_reference[1] = latitude
+    earth_reference[2] = math.sin(latitude)
+    earth_reference[3] = math.cos(latitude)
 
 
 @kernel
-def evaluate_plane(w: Array, plane_gravity: float) -> None:
+def evaluate_plane(lanes: Array, plane_gravity: float) -> None:
     """Fill the same fields for a local tangent plane: constant gravity, no rates, positions in metres."""
     for i in range(LANES):
-        w[GRAVITY + i] = plane_gravity
-        w[EARTH_RATE + i] = 0.0
-        w[EARTH_RATE + LANES + i] = 0.0
-        w[TRANSPORT_RATE + i] = 0.0
-        w[TRANSPORT_RATE + LANES + i] = 0.0
-        w[TRANSPORT_RATE + 2 * LANES + i] = 0.0
-        w[TO_LATITUDE + i] = 1.0
-        w[TO_LONGITUDE + i] = 1.0
+        lanes[GRAVITY + i] = plane_gravity
+        lanes[EARTH_RATE + i] = 0.0
+        lanes[EARTH_RATE + LANES + i] = 0.0
+        lanes[TRANSPORT_RATE + i] = 0.0
+        lanes[TRANSPORT_RATE + LANES + i] = 0.0
+        lanes[TRANSPORT_RATE + 2 * LANES + i] = 0.0
+        lanes[TO_LATITUDE + i] = 1.0
+        lanes[TO_LONGITUDE + i] = 1.0

@@ -22,7 +22,13 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 PACKAGE = Path(__file__).parents[1]
-COMPILED = ("kernels/*.py", "aiding/*.py", "navigate/engine.py", "simulation/flexible.py")
+COMPILED = (
+    "model/states.py",
+    "kernels/*.py",
+    "aiding/*.py",
+    *(f"navigate/{name}.py" for name in ("engine", "silence", "state", "update", "window")),
+    "simulation/flexible.py",
+)
 
 
 def _cache_folder() -> Path:

@@ -32,6 +32,11 @@ class Layout:
         self._end += fields * self._width
         return offset
 
+    def aligned(self) -> int:
+        """Return the offset of what follows, at the begin of a vector of eight."""
+        self._end = self.size
+        return self._end
+
     @property
     def size(self) -> int:
         """Length of the array, in whole vectors of eight."""

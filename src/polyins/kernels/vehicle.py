@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from polyins.kernels import bank, share
+from polyins.kernels import bank, covariance, fuse
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, scalar_kernel
 
@@ -68,30 +68,50 @@ def on_body(c: Matrix, pitch: float, yaw: float) -> Matrix:
 
 
 @scalar_kernel
-def matrix_at(g: Array, c: int) -> Matrix:
-    """Return the matrix at an offset of a share."""
-    return g[c], g[c + 1], g[c + 2], g[c + 3], g[c + 4], g[c + 5], g[c + 6], g[c + 7], g[c + 8]
-
-
-@scalar_kernel
-def put_matrix(g: Array, c: int, v: Matrix) -> None:
-    """Write a matrix at an offset of a share."""
-    g[c], g[c + 1], g[c + 2], g[c + 3], g[c + 4], g[c + 5], g[c + 6], g[c + 7], g[c + 8] = v
-
-
-@scalar_kernel
-def lane_matrix(w: Array, c: int) -> Matrix:
-    """Return the matrix of one IMU at an offset of its block, its lane included."""
+def matrix_at(block: Array, c: int) -> Matrix:
+    """Return the matrix at an offset of a block."""
     return (
-        w[c],
-        w[c + LANES],
-        w[c + 2 * LANES],
-        w[c + 3 * LANES],
-        w[c + 4 * LANES],
-        w[c + 5 * LANES],
-        w[c + 6 * LANES],
-        w[c + 7 * LANES],
-        w[c + 8 * LANES],
+        block[c],
+        block[c + 1],
+        block[c + 2],
+        block[c + 3],
+        block[c + 4],
+        block[c + 5],
+        block[c + 6],
+        block[c + 7],
+        block[c + 8],
+    )
+
+
+@scalar_kernel
+def put_matrix(block: Array, c: int, v: Matrix) -> None:
+    """Write a matrix at an offset of a block."""
+    (
+        block[c],
+        block[c + 1],
+        block[c + 2],
+        block[c + 3],
+        block[c + 4],
+        block[c + 5],
+        block[c + 6],
+        block[c + 7],
+        block[c + 8],
+    ) = v
+
+
+@scalar_kernel
+def lane_matrix(lanes: Array, c: int) -> Matrix:
+    """Return the matrix of one IMU at an offset of its row, its lane included."""
+    return (
+        lanes[c],
+        lanes[c + LANES],
+        lanes[c + 2 * LANES],
+        lanes[c + 3 * LANES],
+        lanes[c + 4 * LANES],
+        lanes[c + 5 * LANES],
+        lanes[c + 6 * LANES],
+        lanes[c + 7 * LANES],
+        lanes[c + 8 * LANES],
     )
 
 
@@ -114,134 +134,170 @@ def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> T
 
 
 @scalar_kernel
-def vehicle_matrix(w: Array, lane: int, lent: Matrix) -> Matrix:
+def vehicle_matrix(lanes: Array, lane: int, lent: Matrix) -> Matrix:
     """C_nv as it follows from the attitude of one IMU."""
-    c = lane_matrix(w, bank.MATRIX + lane)
-    if w[bank.WHEEL + lane] != 0.0:
+    c = lane_matrix(lanes, bank.MATRIX + lane)
+    if lanes[bank.RADIUS + lane] != 0.0:
         return turned_to_axle(lent, c[0], c[3])
-    return on_body(c, w[bank.MOUNTING + LANES + lane], w[bank.MOUNTING + 2 * LANES + lane])
+    return on_body(c, lanes[bank.MOUNT + lane], lanes[bank.MOUNT + LANES + lane])
 
 
 @scalar_kernel
-def lent_matrix(groups: Array, lender: int) -> Matrix:
-    """C_nv of the share that lends roll and pitch; level without one."""
+def lent_matrix(blocks: Array, lender: int) -> Matrix:
+    """C_nv of the block that lends roll and pitch; level without one."""
     if lender < 0:
         return 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
-    return matrix_at(groups[lender], share.VEHICLE)
+    return matrix_at(blocks[lender], covariance.VEHICLE)
 
 
 @scalar_kernel
-def update_attitudes(blocks: Array, groups: Array, members: Array, lenders: Array) -> None:
-    """Write C_nv of each share from its fused attitude; the shares that lend come first in time, not in place."""
+def update_attitudes(rows: Array, blocks: Array, spans: Array, lenders: Array) -> None:
+    """Write C_nv of each block from its fused attitude; the blocks that lend come first in time, not in place."""
     for lending in (True, False):
-        for s in range(members.shape[0]):
-            w, lane = blocks[members[s, 0] // LANES], members[s, 0] % LANES
-            if (w[bank.WHEEL + lane] == 0.0) == lending:
-                g = groups[s]
-                c = matrix_at(g, share.MATRIX)
+        for s in range(spans.shape[0]):
+            lanes, lane = rows[spans[s, 0] // LANES], spans[s, 0] % LANES
+            if (lanes[bank.RADIUS + lane] == 0.0) == lending:
+                block = blocks[s]
+                c = matrix_at(block, covariance.MATRIX)
                 if lending:
-                    v = on_body(c, w[bank.MOUNTING + LANES + lane], w[bank.MOUNTING + 2 * LANES + lane])
+                    v = on_body(c, lanes[bank.MOUNT + lane], lanes[bank.MOUNT + LANES + lane])
                 else:
-                    v = turned_to_axle(lent_matrix(groups, lenders[s]), c[0], c[3])
-                put_matrix(g, share.VEHICLE, v)
+                    v = turned_to_axle(lent_matrix(blocks, lenders[s]), c[0], c[3])
+                put_matrix(block, covariance.VEHICLE, v)
 
 
 @scalar_kernel
-def lever_to_wheel(w: Array, lane: int) -> Three:
+def lever_to_wheel(lanes: Array, lane: int) -> Three:
     """From the IMU to the centre of its wheel, as estimated, m, in its axes; zero on the body."""
-    if w[bank.WHEEL + lane] == 0.0:
+    if lanes[bank.RADIUS + lane] == 0.0:
         return 0.0, 0.0, 0.0
     return (
-        w[bank.TO_WHEEL + lane],
-        w[bank.TO_WHEEL + LANES + lane] + w[bank.MOUNTING + LANES + lane],
-        w[bank.TO_WHEEL + 2 * LANES + lane] + w[bank.MOUNTING + 2 * LANES + lane],
+        lanes[bank.TO_WHEEL + lane],
+        lanes[bank.TO_WHEEL + LANES + lane] + lanes[bank.MOUNT + lane],
+        lanes[bank.TO_WHEEL + 2 * LANES + lane] + lanes[bank.MOUNT + LANES + lane],
     )
 
 
 @scalar_kernel
-def lever_to_speed(w: Array, lane: int, lateral: float) -> Three:
-    """From the IMU to the point whose speed the wheels give, `lateral` m to the right in the rear axle, in its axes.
+def lever_to_speed(lanes: Array, lane: int, x: float, y: float, z: float, lateral: float) -> Three:
+    """From the place (x, y, z) in the vehicle to the point whose speed the wheels give, in the axes of the IMU.
 
-    The axle of a wheel is the x axis of its IMU, so the spin does not move a point on it.
+    That point is `lateral` m to the right in the rear axle. The axle of a wheel is the x axis of its IMU, so the spin
+    does not move a point on it.
     """
-    x, y, z = w[bank.TO_SPEED + lane], w[bank.TO_SPEED + LANES + lane], w[bank.TO_SPEED + 2 * LANES + lane]
-    if w[bank.WHEEL + lane] == 0.0:
-        return x, y + lateral, z
-    return x + lateral, y + w[bank.MOUNTING + LANES + lane], z + w[bank.MOUNTING + 2 * LANES + lane]
+    if lanes[bank.RADIUS + lane] == 0.0:
+        return -x, lateral - y, -z
+    lx, ly, lz = lever_to_wheel(lanes, lane)
+    return lx + lateral - y, ly, lz
 
 
 @scalar_kernel
-def merge(blocks: Array, groups: Array, members: Array, lenders: Array, silent: Array) -> None:
-    """Write the middle of the rear axle, its velocity and the vehicle's attitude into the last group.
+def merge(rows: Array, blocks: Array, spans: Array, lenders: Array) -> None:
+    """Write position and velocity of the vehicle's origin, and its attitude, into the last block.
 
-    Position and velocity are the means over the shares that are not silent, the heading is their mean direction; roll
-    and pitch are those lent. Paper B (7)-(8), with all IMUs in one frame.
+    Position and velocity are means over the blocks that count. Where some of them spin, the heading is their mean
+    direction and roll and pitch are lent; where none does, the attitude is their mean. Paper A (15)-(17); paper B
+    (7)-(8), with all IMUs in one frame. A bank of one block that fuses at the origin is merged already.
     """
-    update_attitudes(blocks, groups, members, lenders)
-    measuring = 0
-    for s in range(members.shape[0]):
-        if silent[s] < 0.0:
-            measuring += 1
-    if measuring == 0:
+    if blocks.shape[0] == spans.shape[0]:
         return
-    merged = groups[-1]
+    update_attitudes(rows, blocks, spans, lenders)
+    counting = 0
+    for s in range(spans.shape[0]):
+        if blocks[s, covariance.COUNTS] != 0.0:
+            counting += 1
+    if counting == 0:
+        return
+    merged = blocks[-1]
     for k in range(6):
-        merged[share.POSITION + k] = 0.0
+        merged[covariance.POSITION + k] = 0.0
+    q0, q1, q2, q3 = 0.0, 0.0, 0.0, 0.0
     forward_n, forward_e = 0.0, 0.0
-    base, lender = -1, -1
-    for s in range(members.shape[0]):
-        if silent[s] >= 0.0:
+    base, lender, spinning = -1, -1, False
+    for s in range(spans.shape[0]):
+        block = blocks[s]
+        if block[covariance.COUNTS] == 0.0:
             continue
-        g = groups[s]
-        w, lane = blocks[members[s, 0] // LANES], members[s, 0] % LANES
+        lanes, lane = rows[spans[s, 0] // LANES], spans[s, 0] % LANES
+        spins = lanes[bank.RADIUS + lane] != 0.0
         if base < 0:
             base = s
-        if lender < 0 and (w[bank.WHEEL + lane] == 0.0 or lenders[s] >= 0):
-            lender = lenders[s] if w[bank.WHEEL + lane] != 0.0 else s
-        v = matrix_at(g, share.VEHICLE)
-        c = matrix_at(g, share.MATRIX)
-        x, y, z = lever_to_wheel(w, lane)
-        ln, le, ld = rotated(c, x, y, z)
-        px, py, pz = w[bank.IN_VEHICLE + lane], w[bank.IN_VEHICLE + LANES + lane], w[bank.IN_VEHICLE + 2 * LANES + lane]
-        pn, pe, pd = rotated(v, px, py, pz)
-        merged[share.POSITION] += (ln - pn) * w[bank.TO_LATITUDE + lane]
-        merged[share.POSITION + 1] += (le - pe) * w[bank.TO_LONGITUDE + lane]
-        merged[share.POSITION + 2] -= ld - pd
-        rn, re, rd = rotated(c, g[share.RATE], g[share.RATE + 1], g[share.RATE + 2])
-        rn -= w[bank.EARTH_RATE + lane]
-        rd -= w[bank.EARTH_RATE + LANES + lane]
-        an, ae, ad = cross(rn, re, rd, ln, le, ld)
-        if w[bank.WHEEL + lane] != 0.0:
+        if lender < 0 and (not spins or lenders[s] >= 0):
+            lender = lenders[s] if spins else s
+        spinning = spinning or spins
+        v = matrix_at(block, covariance.VEHICLE)
+        c = matrix_at(block, covariance.MATRIX)
+        pn, pe, pd = rotated(v, block[covariance.PLACE], block[covariance.PLACE + 1], block[covariance.PLACE + 2])
+        rn, re, rd = rotated(c, block[covariance.RATE], block[covariance.RATE + 1], block[covariance.RATE + 2])
+        rn -= lanes[bank.EARTH_RATE + lane]
+        rd -= lanes[bank.EARTH_RATE + LANES + lane]
+        ln, le, ld = -pn, -pe, -pd
+        un, ue, ud = block[covariance.VELOCITY], block[covariance.VELOCITY + 1], block[covariance.VELOCITY + 2]
+        if spins:
+            x, y, z = lever_to_wheel(lanes, lane)
+            wn, we, wd = rotated(c, x, y, z)
+            ln, le, ld = ln + wn, le + we, ld + wd
+            an, ae, ad = cross(rn, re, rd, wn, we, wd)
+            un, ue, ud = un + an, ue + ae, ud + ad
             spin = rn * c[0] + re * c[3] + rd * c[6]
             rn, re, rd = rn - spin * c[0], re - spin * c[3], rd - spin * c[6]
         bn, be, bd = cross(rn, re, rd, pn, pe, pd)
-        merged[share.VELOCITY] += g[share.VELOCITY] + an - bn
-        merged[share.VELOCITY + 1] += g[share.VELOCITY + 1] + ae - be
-        merged[share.VELOCITY + 2] += g[share.VELOCITY + 2] + ad - bd
+        merged[covariance.POSITION] += ln * lanes[bank.TO_LATITUDE + lane]
+        merged[covariance.POSITION + 1] += le * lanes[bank.TO_LONGITUDE + lane]
+        merged[covariance.POSITION + 2] -= ld
+        merged[covariance.VELOCITY] += un - bn
+        merged[covariance.VELOCITY + 1] += ue - be
+        merged[covariance.VELOCITY + 2] += ud - bd
         for k in range(3):
-            merged[share.POSITION + k] += g[share.POSITION + k] - groups[base, share.POSITION + k]
+            merged[covariance.POSITION + k] += block[covariance.POSITION + k] - blocks[base, covariance.POSITION + k]
+        q0 += block[covariance.QUATERNION]
+        q1 += block[covariance.QUATERNION + 1]
+        q2 += block[covariance.QUATERNION + 2]
+        q3 += block[covariance.QUATERNION + 3]
         norm = 1.0 / math.sqrt(v[0] * v[0] + v[3] * v[3])
         forward_n += v[0] * norm
         forward_e += v[3] * norm
     for k in range(3):
-        merged[share.POSITION + k] = groups[base, share.POSITION + k] + merged[share.POSITION + k] / measuring
-        merged[share.VELOCITY + k] /= measuring
-    lent = lent_matrix(groups, lender)
-    v = turned_about_down(lent, lent[0], lent[3], forward_n, forward_e)
-    put_matrix(merged, share.MATRIX, v)
-    put_matrix(merged, share.VEHICLE, v)
+        merged[covariance.POSITION + k] = (
+            blocks[base, covariance.POSITION + k] + merged[covariance.POSITION + k] / counting
+        )
+        merged[covariance.VELOCITY + k] /= counting
+    if spinning:
+        lent = lent_matrix(blocks, lender)
+        _put_merged(merged, turned_about_down(lent, lent[0], lent[3], forward_n, forward_e))
+        return
+    merged[covariance.QUATERNION], merged[covariance.QUATERNION + 1] = q0, q1
+    merged[covariance.QUATERNION + 2], merged[covariance.QUATERNION + 3] = q2, q3
+    fuse.normalize(merged)
+    fuse.quaternion_to_matrix(merged, covariance.QUATERNION, covariance.MATRIX)
+    lanes, lane = rows[spans[base, 0] // LANES], spans[base, 0] % LANES
+    pitch, yaw = lanes[bank.MOUNT + lane], lanes[bank.MOUNT + LANES + lane]
+    if pitch != 0.0 or yaw != 0.0:
+        _put_merged(merged, on_body(matrix_at(merged, covariance.MATRIX), pitch, yaw))
+    for k in range(9):
+        merged[covariance.VEHICLE + k] = merged[covariance.MATRIX + k]
+
+
+@scalar_kernel
+def _put_merged(merged: Array, v: Matrix) -> None:
+    put_matrix(merged, covariance.MATRIX, v)
+    put_matrix(merged, covariance.VEHICLE, v)
     # of the two quaternions the one whose scalar part, or near the half turn the vertical one, is positive
     reference = (1.0, 0.0, 0.0, 0.0) if v[0] + v[4] + v[8] > 0.0 else (0.0, 0.0, 0.0, 1.0)
     q = quaternion(v, reference)
     for k in range(4):
-        merged[share.QUATERNION + k] = q[k]
+        merged[covariance.QUATERNION + k] = q[k]
 
 
 @scalar_kernel
-def wheel_turned(w: Array, lane: int, v: Matrix, angle: float) -> Matrix:
+def wheel_turned(lanes: Array, lane: int, v: Matrix, angle: float) -> Matrix:
     """Return C_nb of an IMU on a wheel whose axle is that of the vehicle, turned about it from where it was."""
     xn, xe, xd = v[1], v[4], v[7]
-    yn, ye, yd = w[bank.MATRIX + LANES + lane], w[bank.MATRIX + 4 * LANES + lane], w[bank.MATRIX + 7 * LANES + lane]
+    yn, ye, yd = (
+        lanes[bank.MATRIX + LANES + lane],
+        lanes[bank.MATRIX + 4 * LANES + lane],
+        lanes[bank.MATRIX + 7 * LANES + lane],
+    )
     along = yn * xn + ye * xe + yd * xd
     yn, ye, yd = yn - along * xn, ye - along * xe, yd - along * xd
     norm = 1.0 / math.sqrt(yn * yn + ye * ye + yd * yd)
@@ -284,11 +340,11 @@ def quaternion(c: Matrix, near: Quaternion) -> Quaternion:
 
 
 @scalar_kernel
-def put_attitude(w: Array, lane: int, c: Matrix) -> None:
+def put_attitude(lanes: Array, lane: int, c: Matrix) -> None:
     """Give an IMU an attitude: matrix and quaternion, on the side of the hypersphere where it was."""
     for k in range(9):
-        w[bank.MATRIX + k * LANES + lane] = c[k]
+        lanes[bank.MATRIX + k * LANES + lane] = c[k]
     f = bank.QUATERNION + lane
-    q = quaternion(c, (w[f], w[f + LANES], w[f + 2 * LANES], w[f + 3 * LANES]))
+    q = quaternion(c, (lanes[f], lanes[f + LANES], lanes[f + 2 * LANES], lanes[f + 3 * LANES]))
     for k in range(4):
-        w[f + k * LANES] = q[k]
+        lanes[f + k * LANES] = q[k]

@@ -36,7 +36,7 @@ from polyins.live.sources import open_source
 from polyins.live.starter import Starter
 from polyins.model.methods import find_method
 from polyins.model.recording import Recording
-from polyins.navigate import modules
+from polyins.navigate import choice
 from polyins.prepare.alignment import Start
 from polyins.reading import loading
 from polyins.screen import say
@@ -88,7 +88,7 @@ def run(options: Options) -> dict[str, Any]:
     """
     config, document, warnings = loading.read_config(options.config)
     recording, notes = _recording(options, config, document)
-    method = find_method(options.method or modules.usual_method(recording.rig)).name
+    method = find_method(options.method or choice.usual_method(recording.rig)).name
     make_folder(options.out)
     session = _session(options, config, recording, method)
     with _stop_signals() as stopped:

@@ -1,4 +1,7 @@
-"""The method table: who is in the bank, who shares a covariance block, what aids it, how answers merge."""
+"""The method table: who is in the bank, who shares a covariance block, which blocks are joined.
+
+What aids a run is not in it: that follows from the rig and the streams.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,10 @@ class Method:
     """One row of the table."""
 
     name: str
-    bank: Literal["one", "mean", "all", "rolling"]
+    bank: Literal["one", "mean", "all", "modules"]
     """one IMU; one virtual IMU, the mean of all moved to the array origin; all IMUs side by side; or modules on wheels
-    and body, aided by wheel speed"""
-    shares: Literal["each", "all", "module"] = "each"
+    and body. The first three take the IMUs that are fixed to the body"""
+    blocks: Literal["each", "all", "module"] = "each"
     """{1} {2} ... {N}: a covariance block for each; {1 2 ... N}: one block for all; or one block for each module"""
     shared_mechanization: bool = False
     """compute the intermediates of each mechanization from the fused attitude, velocity and position"""
@@ -38,9 +41,9 @@ class Method:
     """names of the IMUs or modules to prefer, where there are more than the method takes"""
 
     @property
-    def rolling(self) -> bool:
-        """Whether wheels aid it."""
-        return self.bank == "rolling"
+    def for_wheels(self) -> bool:
+        """Whether it is made for rigs with an IMU on a wheel."""
+        return self.bank == "modules"
 
 
 METHODS = {
@@ -49,37 +52,39 @@ METHODS = {
         Method("single", bank="one"),
         Method("imu-fusion", bank="mean"),
         Method("nav-fusion", bank="all"),
-        Method("enav-fusion", bank="all", shares="all"),
-        Method("enav-fusion-shared-mechanization", bank="all", shares="all", shared_mechanization=True),
-        Method("wheel-ins", bank="rolling", shares="module", wheels=1),
-        Method("body-ins", bank="rolling", shares="module", wheels=1, bodies=1, wheels_navigate=False),
-        Method("dual-wheel-ins", bank="rolling", shares="module", wheels=2),
-        Method("body-wheel-ins", bank="rolling", shares="module", wheels=1, bodies=1),
-        Method("triple-ins", bank="rolling", shares="module", wheels=2, bodies=1),
-        Method("multi-wheel-ins", bank="rolling", shares="module", wheels=ALL, bodies=ALL),
+        Method("enav-fusion", bank="all", blocks="all"),
+        Method("enav-fusion-shared-mechanization", bank="all", blocks="all", shared_mechanization=True),
+        Method("wheel-ins", bank="modules", blocks="module", wheels=1),
+        Method("body-ins", bank="modules", blocks="module", wheels=1, bodies=1, wheels_navigate=False),
+        Method("dual-wheel-ins", bank="modules", blocks="module", wheels=2),
+        Method("body-wheel-ins", bank="modules", blocks="module", wheels=1, bodies=1),
+        Method("triple-ins", bank="modules", blocks="module", wheels=2, bodies=1),
+        Method("multi-wheel-ins", bank="modules", blocks="module", wheels=ALL, bodies=ALL),
     )
 }
 
-ARRAY_METHODS = tuple(name for name, row in METHODS.items() if not row.rolling)
-"""Of an array with GNSS; the others need wheels."""
+ARRAY_METHODS = tuple(name for name, row in METHODS.items() if not row.for_wheels)
+"""Of the IMUs on a body; the others need wheels."""
 
 
 def find_method(name: str) -> Method:
     """Return the row of that name; raise InputError with the nearest known one otherwise.
 
-    Of a method with wheels, `/` may be followed by IMUs or modules to choose and by `centralized`, as in
-    `body-wheel-ins/IMU4` or `triple-ins/centralized`.
+    After `/` may follow `centralized`, and for a method with wheels IMUs or modules to choose, as in
+    `body-wheel-ins/IMU4`, `triple-ins/centralized` or `nav-fusion/centralized`.
     """
     base, *words = name.split("/")
     if base not in METHODS:
-        near = difflib.get_close_matches(base, METHODS, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else "known: " + ", ".join(METHODS)
+        close = difflib.get_close_matches(base, METHODS, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else "known: " + ", ".join(METHODS)
         raise InputError(f"method: {name!r} is unknown; {hint}")
     row = METHODS[base]
-    if words and not row.rolling:
-        raise InputError(f"method: {name!r}; expected nothing after {base!r}")
+    if CENTRALIZED in words and not row.for_wheels and (row.bank != "all" or row.blocks != "each"):
+        raise InputError(f"method: {name!r}; {base} has one covariance block: expected several to be joined")
+    chosen = tuple(word for word in words if word != CENTRALIZED)
+    if chosen and not row.for_wheels:
+        raise InputError(f"method: {name!r}; expected nothing after {base!r} but {CENTRALIZED}")
     for word in words:
         if words.count(word) > 1:
             raise InputError(f"method: {name!r} says {word!r} twice; expected it once")
-    chosen = tuple(word for word in words if word != CENTRALIZED)
     return replace(row, name=name, joined=CENTRALIZED in words, chosen=chosen)

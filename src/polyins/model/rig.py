@@ -210,7 +210,7 @@ class Rig:
                 raise InputError(f"imus: two IMUs are named {name!r}; expected a name of its own for each")
 
     @property
-    def rolling(self) -> bool:
+    def has_wheels(self) -> bool:
         """Whether there is an IMU on a wheel."""
         return any(imu.wheel is not None for imu in self.imus)
 

@@ -20,6 +20,7 @@ from polyins.errors import InputError
 from polyins.files import write_bytes
 from polyins.model.recording import FilterOptions
 from polyins.model.rig import Rig
+from polyins.navigate.events import Events
 from polyins.prepare.alignment import Start
 from polyins.prepare.assembly import Assembly, Epoch
 from polyins.version import __version__
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 Arrays = dict[str, NDArray[Any]]
 
-MADE, SAMPLES, LINE = "made", "samples.", "line."
+MADE, SAMPLES, EARLY, LINE = "made", "samples.", "early.", "line."
 
 
 @dataclass(frozen=True)
@@ -51,14 +52,16 @@ class Made:
     counts: dict[str, int]
     first: Epoch | None
     """of which the run begins, as long as there is only one"""
-    early: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]]
+    due: tuple[float, float, bool] | None
+    """what the schedule of its own measurements remembers"""
 
 
-def write(path: Path, made: Made, assembly: Assembly, timeline: Timeline | None) -> None:
-    """Write a navigator to a file, which is whole or absent."""
+def write(path: Path, made: Made, assembly: Assembly, early: Events, timeline: Timeline | None) -> None:
+    """Write a navigator to a file, which is whole or absent; `early` came before its first epoch."""
     text = json.dumps(_converter().unstructure(made))
     arrays: Arrays = {MADE: np.frombuffer(text.encode(), dtype=np.uint8)}
     arrays |= {SAMPLES + name: array for name, array in assembly.arrays().items()}
+    arrays |= {EARLY + name: array for name, array in early._asdict().items()}
     if timeline is not None:
         arrays |= {LINE + name: array for name, array in timeline.arrays().items()}
     content = io.BytesIO()
@@ -66,8 +69,8 @@ def write(path: Path, made: Made, assembly: Assembly, timeline: Timeline | None)
     write_bytes(path, content.getvalue())
 
 
-def read(path: Path) -> tuple[Made, Arrays, Arrays]:
-    """Return what `write` was given, the last two as arrays; raise InputError for any other file."""
+def read(path: Path) -> tuple[Made, Arrays, Events, Arrays]:
+    """Return what `write` was given, assembly and timeline as arrays; raise InputError for any other file."""
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays: Arrays = dict(file)
@@ -76,7 +79,8 @@ def read(path: Path) -> tuple[Made, Arrays, Arrays]:
         raise InputError(f"{path}: is no checkpoint ({error}); expected a file that a navigator saved") from error
     if values["polyins"] != __version__:
         raise InputError(f"{path}: of polyins {values['polyins']}; expected one of {__version__}")
-    return _converter().structure(values, Made), _named(SAMPLES, arrays), _named(LINE, arrays)
+    early = Events(**_named(EARLY, arrays))
+    return _converter().structure(values, Made), _named(SAMPLES, arrays), early, _named(LINE, arrays)
 
 
 def _named(prefix: str, arrays: Arrays) -> Arrays:

@@ -1,4 +1,4 @@
-"""The live front of the engine: IMU samples and GNSS fixes as they come, the state at any time.
+"""The live front of the engine: samples and measurements as they come, the state at any time.
 
 A recording that is played through it gives the solution of a batch run, bit for bit.
 """
@@ -12,13 +12,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polyins.aiding import kinds
 from polyins.errors import InputError
+from polyins.model.attitude import euler_angles, euler_variance
 from polyins.model.methods import find_method
 from polyins.model.recording import FilterOptions, Recording
 from polyins.model.rig import Rig
-from polyins.navigate import batch, checkpoint, modules
+from polyins.navigate import batch, checkpoint, events
 from polyins.navigate.checkpoint import Made
+from polyins.navigate.choice import choose
+from polyins.navigate.events import Events
+from polyins.navigate.state import MAY_BE_SILENT
 from polyins.navigate.timeline import Timeline
+from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.assembly import DUPLICATED, FUTURE_STAMPED, LATE, Assembly, Epoch
 from polyins.prepare.timesync import Aligned
@@ -27,8 +33,6 @@ from polyins.version import __version__
 Array = NDArray[np.float64]
 
 NOT_FINITE, BEFORE_START, NO_STD = "not finite", "before the start", "std not positive"
-NO_FIX = -1.0
-"""Variance of a velocity that is not there."""
 HEALTH_WINDOW = 1.0  # s
 
 
@@ -54,15 +58,11 @@ class NavigatorState:
     @property
     def euler(self) -> Array:
         """Roll, pitch and heading, rad, shape (3,)."""
-        from polyins.model.attitude import euler_angles
-
         return np.asarray(euler_angles(self.attitude[None])[0])
 
     @property
     def attitude_std(self) -> Array:
         """Standard deviations of roll, pitch and heading, rad, shape (3,)."""
-        from polyins.model.attitude import euler_variance
-
         return np.asarray(np.sqrt(euler_variance(self.euler[None], self.phi_covariance[None])[0]))
 
 
@@ -87,9 +87,9 @@ class Navigator:
     """Navigates with the IMUs of a rig from a known start.
 
     `method` and `options` are those of a batch run; `imu` is the index of the IMU that `single` uses. `delay`: how late
-    a fix may come, s. `wait`: how long, in time of the data, an epoch waits for a sample that is missing, s; samples of
-    several IMUs may arrive in any order within it. The gyros of the IMUs need not be synchronised: epochs are those of
-    the first IMU. Raises InputError for a method that the rig has not the IMUs for.
+    a measurement may come, s. `wait`: how long, in time of the data, an epoch waits for a sample that is missing, s;
+    samples of several IMUs may arrive in any order within it. The gyros of the IMUs need not be synchronised: epochs
+    are those of the first IMU. Raises InputError for a method that the rig has not the IMUs for.
     """
 
     def __init__(
@@ -105,23 +105,26 @@ class Navigator:
         wait: float = 0.05,
     ) -> None:
         self.method = find_method(method)
-        self._taken = batch.taken(self.method, rig, imu)
+        choice = choose(self.method, rig, imu)
+        self._taken = choice.all
         if len(start.imu_errors) != len(rig.imus):
             raise InputError(f"start: errors of {len(start.imu_errors)} IMUs; expected those of {len(rig.imus)}")
         options = options or FilterOptions()
-        self._made = Made(__version__, rig, start, method, options, geodetic, imu, delay, wait, {}, None, [])
+        self._made = Made(__version__, rig, start, method, options, geodetic, imu, delay, wait, {}, None, None)
         rig, self.start, self.delay = rig.subset(self._taken), start.subset(self._taken), delay
         self._recording = Recording(rig, (), geodetic=geodetic, options=options)
         self._imus = len(start.imu_errors)
         self._takes_some = self._taken != list(range(self._imus))
         self._place = {index: place for place, index in enumerate(self._taken)}
-        self._modules = modules.choose(self.method, rig) if self.method.rolling else None
-        self._order = slice(None) if self._modules is None else np.array(modules.lanes(self._modules)[1])
-        self._assembly = Assembly(len(rig.imus), wait, bridge=not self.method.rolling)
+        self._choice = choice.renumbered()
+        self._assembly = Assembly(len(rig.imus), wait, bridge=not rig.has_wheels)
+        self._schedule: wheels.Schedule | None = None
         self._timeline: Timeline | None = None
+        self._order: list[int] = []
+        """of each lane the IMU that stands in it"""
         self._first: Epoch | None = None
-        self._early: list[tuple[float, Array, Array]] = []
-        """fixes that came before the first epoch"""
+        self._early: list[Events] = []
+        """measurements that came before the first epoch"""
         self.counts: dict[str, int] = {}
         """what was refused, by kind"""
 
@@ -152,25 +155,16 @@ class Navigator:
         velocity: ArrayLike | None = None,
         velocity_std: ArrayLike | None = None,
     ) -> None:
-        """Take a fix of the antenna: position as in `polyins.model.recording`, its std m; velocity and its std, m/s.
+        """Take a fix of the antenna: position as in `model.recording`, its std m; velocity and its std, m/s.
 
         It may come `delay` seconds late and is applied at its own time all the same. A fix that cannot be taken is
         counted in `counts`.
         """
-        fix = np.concatenate([position, np.square(position_std)], dtype=np.float64)
-        row = np.full(6, NO_FIX)
+        antenna = self._recording.rig.antenna
+        fix = [events.of_point(kinds.GNSS_POSITION, time, position, antenna, position_std)]
         if velocity is not None and velocity_std is not None:
-            row = np.concatenate([velocity, np.square(velocity_std)], dtype=np.float64)
-        if not math.isfinite(fix.sum() + row.sum() + time):
-            self._refuse(NOT_FINITE)
-        elif not (fix[3:] > 0.0).all():
-            self._refuse(NO_STD)
-        elif time > self._assembly.newest + self.delay:
-            self._refuse(FUTURE_STAMPED)
-        elif self._timeline is None:
-            self._early.append((time, fix, row))
-        else:
-            self._refuse(self._aid(self._timeline, time, fix, row))
+            fix.append(events.of_point(kinds.GNSS_VELOCITY, time, velocity, antenna, velocity_std))
+        self._measure(*fix)
 
     def flush(self) -> None:
         """Take everything that still waits: there are no more data."""
@@ -183,7 +177,7 @@ class Navigator:
         return None if line is None else _state(line, line.last)
 
     def history(self, after: float = -math.inf) -> list[NavigatorState]:
-        """Return the states of all epochs later than `after`, s, as far back as a fix may still come."""
+        """Return the states of all epochs later than `after`, s, as far back as a measurement may still come."""
         line = self._timeline
         if line is None:
             return []
@@ -196,7 +190,7 @@ class Navigator:
         """How each IMU that navigates does."""
         assembly, line = self._assembly, self._timeline
         gyro = accel = np.full(len(self._taken), math.nan)
-        if line is not None and self._modules is None:
+        if line is not None and not self._recording.rig.has_wheels:
             gyro, accel = _residuals(line)
         return tuple(
             ImuHealth(
@@ -212,13 +206,14 @@ class Navigator:
 
     def save(self, path: Path | str) -> None:
         """Write everything to a file from which `resume` goes on as if nothing had happened."""
-        made = replace(self._made, counts=self.counts, first=self._first, early=self._early)
-        checkpoint.write(Path(path), made, self._assembly, self._timeline)
+        due = None if self._schedule is None else self._schedule.memory
+        made = replace(self._made, counts=self.counts, first=self._first, due=due)
+        checkpoint.write(Path(path), made, self._assembly, events.merged(*self._early), self._timeline)
 
     @classmethod
     def resume(cls, path: Path | str) -> Navigator:
         """Return the navigator that was saved; raise InputError for a file that is not whole or of another version."""
-        made, samples, line = checkpoint.read(Path(path))
+        made, samples, early, line = checkpoint.read(Path(path))
         navigator = cls(
             made.rig,
             made.start,
@@ -229,11 +224,14 @@ class Navigator:
             delay=made.delay,
             wait=made.wait,
         )
-        navigator.counts, navigator._first, navigator._early = made.counts, made.first, made.early
+        navigator.counts, navigator._first = made.counts, made.first
+        navigator._early = [early.at(slice(row, row + 1)) for row in range(len(early.time))]
         navigator._assembly.restore(samples)
         if line:
             navigator._timeline = navigator._new_timeline(np.array([0.0, 1.0]), np.zeros((2, 6, len(navigator._taken))))
             navigator._timeline.restore(line)
+        if made.due is not None and navigator._schedule is not None:
+            navigator._schedule.memory = made.due
         return navigator
 
     def _refuse(self, why: str) -> None:
@@ -262,8 +260,7 @@ class Navigator:
 
     def _take(self, epoch: Epoch) -> None:
         if self._timeline is not None:
-            epoch = self._completed(epoch, self._timeline)
-            self._timeline.append(epoch.time, epoch.increments[:, self._order], *self._wheels(epoch))
+            self._append(epoch, self._timeline)
         elif self._first is not None:
             self._begin(self._first, epoch)
         elif epoch.time >= self.start.time:
@@ -272,50 +269,73 @@ class Navigator:
     def _new_timeline(self, time: Array, increments: Array) -> Timeline:
         """Lay the method out for its first two epochs."""
         aligned = Aligned(time, increments, (), np.zeros((len(time), len(self._taken)), dtype=bool))
-        return Timeline(batch.lay_out(self.method, self._recording, aligned, self.start), self.delay)
+        prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start)
+        prepared.plan.settings[MAY_BE_SILENT] = True
+        self._order = prepared.order
+        self._schedule = batch.schedule_of(self._choice, self._recording, self.start)
+        return Timeline(prepared, self.delay)
 
     def _begin(self, first: Epoch, second: Epoch) -> None:
         increments = np.array([first.increments, second.increments])
         self._timeline = self._new_timeline(np.array([first.time, second.time]), increments)
         self._first = None
         early, self._early = self._early, []
-        for time, fix, velocity in early:
-            self._refuse(self._aid(self._timeline, time, fix, velocity))
+        for event in early:
+            self._refuse(self._aid(self._timeline, event))
         self._take(second)
 
-    def _aid(self, line: Timeline, time: float, fix: Array, velocity: Array) -> str:
-        if line.has_fix(time):
+    def _append(self, epoch: Epoch, line: Timeline) -> None:
+        """Complete an epoch by what the rig says of it, and let the timeline take it."""
+        rig, interval = self._recording.rig, np.array([epoch.time - line.time])
+        increments, present = epoch.increments, np.ones(len(rig.imus), dtype=np.uint8)
+        if epoch.missing.any():
+            one = Aligned(
+                np.array([line.time, epoch.time]),
+                np.array([epoch.increments, epoch.increments]),
+                (),
+                np.array([epoch.missing, epoch.missing]),
+            )
+            increments = rigid.completed(rig, one, self.start.imu_errors).increments[1]
+            present = batch.present_of(self._recording, epoch.missing[None])[0]
+        travel = np.zeros((1, 2))
+        if self._choice.speed:
+            lacking, bias = (present == rigid.NOTHING)[None], self.start.imu_errors[:, :3]
+            travel = wheels.travel(rig, self._choice.speed, increments[None], interval, lacking, bias)
+        stamp = np.array([epoch.time])
+        assert self._schedule is not None
+        due = self._schedule.events(stamp, interval, travel[:, 1])
+        line.append(
+            epoch.time,
+            increments[:, self._order],
+            present[self._order],
+            travel[0],
+            events.scheduled(due, stamp, self._recording.options),
+        )
+
+    def _measure(self, *measurements: Events) -> None:
+        """Take measurements of one time and one source: all or none."""
+        time = float(measurements[0].time[0])
+        if not math.isfinite(time + sum(one.value.sum() + one.variance.sum() for one in measurements)):
+            self._refuse(NOT_FINITE)
+        elif not all((one.variance > 0.0).any() and not (one.variance < 0.0).any() for one in measurements):
+            self._refuse(NO_STD)
+        elif time > self._assembly.newest + self.delay:
+            self._refuse(FUTURE_STAMPED)
+        elif self._timeline is None:
+            self._early.extend(measurements)
+        else:
+            for one in measurements:
+                refused = self._aid(self._timeline, one)
+                if refused:
+                    self._refuse(refused)
+                    return
+
+    def _aid(self, line: Timeline, event: Events) -> str:
+        if line.has_event(int(event.kind[0]), float(event.time[0])):
             return DUPLICATED
-        if line.insert(time, fix, velocity):
+        if line.insert(event):
             return ""
         return BEFORE_START if line.whole else LATE
-
-    def _completed(self, epoch: Epoch, line: Timeline) -> Epoch:
-        """Give chips that are silent what the others of their module measure."""
-        if self._modules is None or not epoch.missing.any():
-            return epoch
-        increments, missing = modules.completed(
-            self._modules,
-            self._recording.rig.imus,
-            epoch.increments[None],
-            np.array([epoch.time - line.time]),
-            epoch.missing[None],
-            self.start.imu_errors,
-        )
-        return Epoch(epoch.time, increments[0], missing[0])
-
-    def _wheels(self, epoch: Epoch) -> tuple[Array, NDArray[np.bool_]] | tuple[()]:
-        """Return what the wheels rolled in an epoch, and which modules have data."""
-        if self._modules is None:
-            return ()
-        line = self._timeline
-        assert line is not None
-        interval = np.array([epoch.time - line.time])
-        missing = epoch.missing[None]
-        travel = modules.travel(
-            self._modules, self._recording.rig, epoch.increments[None], interval, missing, self.start.imu_errors[:, :3]
-        )
-        return travel[0], modules.present(self._modules, missing)[0]
 
 
 def _state(line: Timeline, k: int) -> NavigatorState:

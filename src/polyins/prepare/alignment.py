@@ -100,7 +100,7 @@ class Start:
 
 def find_start(recording: Recording, aligned: Aligned) -> Start:
     """Find the start of a recording whose IMUs are on one time base; raise InputError where nothing gives it."""
-    search = _RollingSearch if recording.rig.rolling else _Search
+    search = _RollingSearch if recording.rig.has_wheels else _Search
     return search(recording, aligned).run()
 
 

@@ -15,6 +15,8 @@ from polyins.model.rig import DEG
 from polyins.model.solution import Solution
 
 Array = NDArray[np.float64]
+Track = Solution
+"""as dead reckoning from heading zero gives it"""
 
 LENGTH = 50.0
 """m of track that are compared; farther on dead reckoning bends"""
@@ -51,7 +53,7 @@ def blind(recording: Recording) -> Recording:
     return replace(recording, gnss=None, outages=(), start=start)
 
 
-def find(recording: Recording, begin: float, navigate: Callable[[Recording], Solution]) -> Course:
+def find(recording: Recording, begin: float, navigate: Callable[[Recording], Track]) -> Course:
     """Dead-reckon with heading zero by `navigate` and fit the track to GNSS; raise InputError if it is too short.
 
     `begin`: when the run starts, s. The rotation is the one of least squares in the horizontal plane, robust against
@@ -90,7 +92,7 @@ def _end(recording: Recording, gnss: GnssStream, begin: float) -> float | None:
     return end if np.isfinite(end) else None
 
 
-def _pairs(recording: Recording, gnss: GnssStream, solution: Solution) -> tuple[Array, Array]:
+def _pairs(recording: Recording, gnss: GnssStream, solution: Track) -> tuple[Array, Array]:
     """Return the antenna as dead-reckoned and as fixed at the fixes of the first stretch, m north and east."""
     from scipy.spatial.transform import Rotation
 

@@ -38,7 +38,7 @@ def write(recording: Recording, folder: str | Path) -> Path:
     config["start"] = _start(recording.start, recording.geodetic)
     config["outages"] = [list(outage) for outage in recording.outages]
     config["filter"] = _filter(recording.options)
-    if recording.rig.rolling:
+    if recording.rig.has_wheels:
         config["filter"]["rolling"] = _rolling(recording.options.rolling)
     write_bytes(place / CONFIG, write_yaml(config).encode())
     return place / CONFIG

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.evaluation.consistency import nees, nees_bounds, share_inside
-from polyins.kernels import share
+from polyins.kernels import covariance
 from polyins.model.attitude import rotation_matrices
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import StartOptions
 from polyins.model.rig import DEG
 from polyins.navigate import batch
+from polyins.navigate.state import LOG_EVERY, STRIDE
 from polyins.prepare.alignment import rotation_matrix
 from polyins.simulation.path import Path, Truth
 from polyins.simulation.run import simulate_with_truth
@@ -61,12 +62,13 @@ def errors_of(scenario: Scenario, seed: int) -> tuple[Array, Array]:
     simulation = simulate_with_truth(scenario, seed=seed)
     start = _start(simulation.path, scenario.start_std, np.random.default_rng([seed, 1]))
     run = batch.prepare(replace(simulation.recording, start=start), "single")
-    every = run.plan.log_every
+    every = int(run.plan.settings[LOG_EVERY])
+    stride = int(run.plan.settings[STRIDE])
     covariances = []
     for first in range(1, len(run.inputs.time) - every, every):
         run.advance(first, first + every)
-        p = run.state.groups[0, share.P : share.P + share.STATES * share.STRIDE]
-        covariances.append(p.reshape(share.STATES, share.STRIDE)[:STATES, :STATES].copy())
+        p = run.state.blocks[0, covariance.P : covariance.P + stride**2]
+        covariances.append(p.reshape(stride, stride)[:STATES, :STATES].copy())
     rows = np.arange(len(covariances)) * every + every
     truth = simulation.path.truth(run.inputs.time[rows])
     return navigation_errors(run.outputs.states[rows], truth), np.array(covariances)

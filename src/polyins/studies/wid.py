@@ -23,7 +23,7 @@ from polyins.model.recording import Recording
 from polyins.model.rig import DEG, HOUR, Imu, Rig
 from polyins.model.solution import Solution
 from polyins.navigate import batch
-from polyins.navigate.modules import choose
+from polyins.navigate.choice import choose
 from polyins.reading import datasets
 from polyins.screen import number, print_table
 

@@ -14,7 +14,7 @@ from polyins.model.methods import ARRAY_METHODS, find_method
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
 from polyins.navigate import batch
-from polyins.navigate.modules import available
+from polyins.navigate.choice import available
 from polyins.tools.parallel import Progress, cores, run_all
 from polyins.version import __version__
 
@@ -51,11 +51,11 @@ def compare(
     `progress` is called with the share of all runs that is done. Raises InputError for an unknown method, before
     anything runs.
     """
-    wheels = recording.rig.rolling
+    wheels = recording.rig.has_wheels
     if methods is None:
         methods = available(recording.rig) if wheels else ARRAY_METHODS
     for name in methods:
-        if find_method(name).rolling != wheels:
+        if find_method(name).for_wheels != wheels:
             raise InputError(f"method: {name!r} is for rigs {'without' if wheels else 'with'} wheels")
     alone = "wheel-ins" if wheels else "single"
     arrays = [name for name in methods if name != alone]
@@ -115,7 +115,7 @@ def _run(recording: Recording, method: str, imu: int, tell: Progress) -> tuple[S
 def singles_of(recording: Recording) -> list[str]:
     """Return what is run on its own: every IMU, or on a vehicle every module on a wheel that gives speed."""
     rig = recording.rig
-    if not rig.rolling:
+    if not rig.has_wheels:
         return [imu.name for imu in rig.imus]
     wheels = {name: rig.imus[indices[0]].wheel for name, indices in rig.modules().items()}
     return [name for name, wheel in wheels.items() if wheel is not None and not wheel.steering]

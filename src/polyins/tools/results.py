@@ -40,7 +40,7 @@ def write_comparison(folder: Path, recording: Recording, result: Comparison, rep
     has a folder of its name.
     """
     summaries = result.document["methods"]
-    alone = "wheel-ins" if recording.rig.rolling else "single"
+    alone = "wheel-ins" if recording.rig.has_wheels else "single"
     for name, solution in result.solutions.items():
         if name != alone:
             write_solution(solution, folder / name)

@@ -29,7 +29,8 @@ from polyins.model.recording import ImuStream, Recording
 from polyins.model.solution import Innovations, Solution
 from polyins.navigate import batch
 from polyins.navigate.batch import Prepared
-from polyins.navigate.engine import Outputs
+from polyins.navigate.choice import choose
+from polyins.navigate.state import LOG_EVERY, NEXT_LOG, Outputs
 from polyins.prepare import alignment, timesync
 from polyins.prepare.timesync import Aligned
 from polyins.reading import loading
@@ -107,7 +108,7 @@ def run(
     Raises InputError as `batch.run` does, and where a row turns out wrong on the way.
     """
     row = find_method(method)
-    if row.rolling:
+    if row.for_wheels:
         raise InputError(f"method: {row.name} is for rigs with wheels; expected one for arrays")
     if row.bank == "one":
         recording = recording.subset([imu])
@@ -118,7 +119,9 @@ def run(
     first_call_s = clock.perf_counter() - begin
     filter_s = 0.0
     with SolutionWriter(folder) as writer:
-        for stretch in _whole_logs(_epochs(recording, laid_out, end, stretch_s), laid_out.plan.log_every):
+        for stretch in _whole_logs(
+            _epochs(recording, laid_out, end, stretch_s), int(laid_out.plan.settings[LOG_EVERY])
+        ):
             begin = clock.thread_time()
             part = _navigate(laid_out, stretch)
             filter_s += clock.thread_time() - begin
@@ -185,7 +188,9 @@ def _lay_out(row: Method, recording: LongRecording) -> tuple[Prepared, float]:
         )
     start = alignment.find_start(head, aligned)
     end = last if head.start.end_time is None else min(last, head.start.end_time)
-    return _light(batch.lay_out(row, head, aligned.between(start.time, np.inf), start, end=end)), end
+    return _light(
+        batch.lay_out(row, choose(row, head.rig), head, aligned.between(start.time, np.inf), start, end=end)
+    ), end
 
 
 def _light(run: Prepared) -> Prepared:
@@ -193,13 +198,13 @@ def _light(run: Prepared) -> Prepared:
     none = np.empty(0)
     streams = tuple(ImuStream(stream.name, none, none, none) for stream in run.recording.imus)
     first = _part(run.aligned, slice(0, 1))
-    outputs = batch.build_outputs(1, 0, run.outputs.log.shape[3], 1, run.outputs.log.shape[2])
+    outputs = batch.empty_outputs(1, 0, run.outputs.log.shape[3], run.plan, run.outputs.log.shape[2])
     return replace(
         run,
         recording=replace(run.recording, imus=streams),
         aligned=first,
         inputs=run.inputs._replace(time=first.time, increments=first.increments),
-        outputs=outputs._replace(fix_status=run.outputs.fix_status, innovations=run.outputs.innovations),
+        outputs=outputs._replace(event_status=run.outputs.event_status, innovations=run.outputs.innovations),
     )
 
 
@@ -264,11 +269,11 @@ def _navigate(run: Prepared, stretch: Aligned) -> Solution:
     """Take the epochs of a stretch after its first, with the state as the stretch before has left it."""
     epochs = len(stretch.time)
     increments = np.ascontiguousarray(stretch.increments)
-    empty = batch.build_outputs(epochs, 0, run.outputs.log.shape[3], run.plan.log_every, run.outputs.log.shape[2])
-    outputs: Outputs = empty._replace(fix_status=run.outputs.fix_status, innovations=run.outputs.innovations)
+    empty = batch.empty_outputs(epochs, 0, run.outputs.log.shape[3], run.plan, run.outputs.log.shape[2])
+    outputs: Outputs = empty._replace(event_status=run.outputs.event_status, innovations=run.outputs.innovations)
     inputs = run.inputs._replace(time=stretch.time, increments=increments)
     part = replace(run, aligned=stretch, inputs=inputs, outputs=outputs)
-    run.state.counters[2] = 0
+    run.state.scalars[NEXT_LOG] = 0.0
     part.advance(1, epochs)
     return batch.solution_of(part)
 

@@ -1,4 +1,4 @@
-"""Standstills of a vehicle: told from straight driving, and used to calibrate gyros."""
+"""Standstills of a vehicle: what no velocity says, and when it is taken for one."""
 
 from __future__ import annotations
 
@@ -6,12 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import BODY, Check, Moving
 from driven_vehicle import drive, with_rolling
 
 import polyins as pi
-from polyins.aiding import rolling
-from polyins.navigate import batch
+from polyins.aiding import kinds
+from polyins.navigate import batch, update
 from polyins.simulation.scenario import Errors
+
+EVENT = np.array([kinds.ZERO_VELOCITY, 1.0])
+
+
+@pytest.mark.parametrize("s", [0, BODY])
+def test_of_a_vehicle(vehicle: Moving, check_design: Check, s: int) -> None:
+    check_design(vehicle, EVENT, s)
+
+
+def test_of_an_array(array: Moving, check_design: Check) -> None:
+    check_design(array, EVENT)
 
 
 def test_driving_straight_on_is_no_standstill() -> None:
@@ -19,13 +31,14 @@ def test_driving_straight_on_is_no_standstill() -> None:
     recording = drive()
     run = batch.prepare(recording, "body-ins")
     run.advance(1, len(run.inputs.time))
-    assert run.rolling is not None
     reference = recording.reference
     assert reference is not None
     assert reference.velocity is not None
     shown = reference.time > run.start.time
     standing = np.mean(np.linalg.norm(reference.velocity[shown], axis=1) < 0.01) * (reference.time[-1] - run.start.time)
-    assert run.rolling.memory[rolling.STILL] == pytest.approx(standing, abs=2.5)
+    taken = (run.inputs.event_kind == kinds.ZERO_VELOCITY) & (run.outputs.event_status == update.ACCEPTED)
+    stood = np.count_nonzero(taken) * recording.options.rolling.speed_interval
+    assert stood == pytest.approx(standing, abs=2.5)
 
 
 def test_at_a_stop_the_gyros_are_calibrated() -> None:

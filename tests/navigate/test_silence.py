@@ -59,7 +59,7 @@ def test_a_wheel_alone_coasts_and_finds_its_angle_again() -> None:
     whole = batch.prepare(drive(), "wheel-ins/left")
     whole.advance(1, len(whole.inputs.time))
     angles = [
-        Rotation.from_quat(p.state.blocks[0, bank.QUATERNION : bank.QUATERNION + 4 * LANES : LANES], scalar_first=True)
+        Rotation.from_quat(p.state.rows[0, bank.QUATERNION : bank.QUATERNION + 4 * LANES : LANES], scalar_first=True)
         for p in (run, whole)
     ]
     assert (angles[0].inv() * angles[1]).magnitude() < 15.0 * DEG

@@ -1,0 +1,121 @@
+"""The table of kinds of measurement: a new one is a row here, a branch of `design` and `residual`, and its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from polyins.aiding import heading, height, odometer, point, velocity, wheel_speed, zero_rate, zero_velocity
+from polyins.aiding.measurement import KIND
+from polyins.kernels import vehicle
+from polyins.kernels.jit import Array, scalar_kernel
+from polyins.model import states
+
+(
+    GNSS_POSITION,
+    GNSS_VELOCITY,
+    WHEEL_SPEED,
+    REFERENCE_POINT,
+    ZERO_VELOCITY,
+    ZERO_RATE,
+    HEIGHT,
+    HEADING,
+    ODOMETER,
+    WINDOW,
+) = range(10)
+
+MEAN: Final = 0
+EACH: Final = 1
+DIFFERENCES: Final = 2
+"""How joined blocks take it: its noise is one, so that the mean of what all predict is measured; each block has noise
+of its own; or what the blocks predict is compared between them."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is known of a kind of measurement beside its formulas."""
+
+    name: str
+    unit: str
+    """of its residual"""
+    axes: tuple[str, ...]
+    """of its residual; those of the kinds with fewer than three come first"""
+    joined: Literal[0, 1, 2] = MEAN
+    reopens: bool = False
+    """whether after several rejections in a row the next one is believed and the covariance grows to match"""
+    in_vehicle: bool = False
+    """whether it depends on the attitude of the vehicle, beyond that of the IMU"""
+    estimates: tuple[str, ...] = ()
+    """states that only exist where there is such a measurement"""
+
+
+NORTH_EAST_DOWN, FORWARD_RIGHT_DOWN = ("north", "east", "down"), ("forward", "right", "down")
+
+KINDS = (
+    Kind("GNSS position", "m", NORTH_EAST_DOWN, reopens=True, in_vehicle=True),
+    Kind("GNSS velocity", "m/s", NORTH_EAST_DOWN, in_vehicle=True),
+    Kind("wheel speed", "m/s", FORWARD_RIGHT_DOWN, joined=EACH, in_vehicle=True),
+    Kind("reference point", "m", NORTH_EAST_DOWN, joined=DIFFERENCES, in_vehicle=True),
+    Kind("zero velocity", "m/s", NORTH_EAST_DOWN, joined=EACH),
+    Kind("zero rate", "rad/s", ("x", "y", "z"), joined=EACH),
+    Kind("height", "m", ("down",), in_vehicle=True, estimates=("height_bias",)),
+    Kind("heading", "rad", ("about down",), in_vehicle=True, estimates=("heading_offset",)),
+    Kind("odometer", "m/s", FORWARD_RIGHT_DOWN, in_vehicle=True),
+    # not a measurement: from here on the mean speed of the next one is taken
+    Kind("window", "", ()),
+)
+
+JOINED = tuple(kind.joined for kind in KINDS)
+REOPENS = tuple(kind.reopens for kind in KINDS)
+IN_VEHICLE = tuple(kind.in_vehicle for kind in KINDS)
+
+
+def states_for(kinds: set[int], mounting: bool) -> int:
+    """Return how many error states a filter needs: the IMU's own, those of its mounting, and those of the kinds."""
+    wanted = {name for kind in kinds for name in KINDS[kind].estimates} | ({"mount"} if mounting else set())
+    last = max(wanted, key=states.place, default="mount")
+    size = {row.name: row.size for row in states.TABLE}
+    return states.place(last) + size[last]
+
+
+@scalar_kernel
+def design(block: Array, lanes: Array, lane: int, measurement: Array, update: Array) -> None:
+    """Write the design matrix of a measurement at the fused state of a block, whose first member is that lane."""
+    kind = int(measurement[KIND])
+    if kind in (GNSS_POSITION, REFERENCE_POINT):
+        point.design(block, lanes, lane, measurement, update)
+    elif kind == GNSS_VELOCITY:
+        velocity.design(block, lanes, lane, measurement, update)
+    elif kind == WHEEL_SPEED:
+        wheel_speed.design(block, lanes, lane, measurement, update)
+    elif kind == ODOMETER:
+        odometer.design(block, lanes, lane, measurement, update)
+    elif kind == HEIGHT:
+        height.design(block, lanes, lane, measurement, update)
+    elif kind == HEADING:
+        heading.design(block, update)
+    elif kind == ZERO_VELOCITY:
+        zero_velocity.design(update)
+    else:
+        zero_rate.design(block, update)
+
+
+@scalar_kernel
+def residual(lanes: Array, lane: int, lent: vehicle.Matrix, measurement: Array) -> vehicle.Three:
+    """Return predicted less measured, as one IMU has it."""
+    kind = int(measurement[KIND])
+    if kind in (GNSS_POSITION, REFERENCE_POINT):
+        return point.residual(lanes, lane, lent, measurement)
+    if kind == GNSS_VELOCITY:
+        return velocity.residual(lanes, lane, lent, measurement)
+    if kind == WHEEL_SPEED:
+        return wheel_speed.residual(lanes, lane, lent, measurement)
+    if kind == ODOMETER:
+        return odometer.residual(lanes, lane, lent, measurement)
+    if kind == HEIGHT:
+        return height.residual(lanes, lane, lent, measurement)
+    if kind == HEADING:
+        return heading.residual(lanes, lane, lent, measurement)
+    if kind == ZERO_VELOCITY:
+        return zero_velocity.residual(lanes, lane)
+    return zero_rate.residual(lanes, lane, measurement)

@@ -1,0 +1,196 @@
+"""What the engine works on: what a run remembers, is told, is given, writes, and needs as work arrays.
+
+Each is a tuple of arrays. All that a run remembers lies in one array of which those of `State` are parts, so that a run
+can be cut anywhere, kept as a copy of that array, and taken up again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from polyins.aiding import kinds, measurement
+from polyins.kernels import bank, covariance, fuse, kalman, layout
+from polyins.kernels.jit import Array
+from polyins.kernels.layout import Layout
+from polyins.model.states import EIGHT
+
+_layout = Layout()
+_take = _layout.take
+
+# --- places in `State.scalars`
+TIME = _take(1)  # of the state, s
+INTERVAL = _take(1)  # length of the last interval, s
+NEXT_EVENT = _take(1)  # its index
+NEXT_LOG = _take(1)  # row of the log
+REJECTIONS = _take(len(kinds.KINDS))  # in a row, by kind
+REJECTED_AT = _take(1)  # time of the last GNSS position that was rejected, s
+AT_REST = _take(1)  # whether the vehicle stood in the last window
+WINDOW_BEGIN = _take(1)  # s; of the window over which a mean speed or rate is taken
+WINDOW_FILLED = _take(1)  # epochs in it; below zero: none is open
+WINDOW_TRAVEL = _take(1)  # what the wheels rolled in it, m
+WINDOW_LATERAL = _take(1)  # m to the right of the axle's middle: the mean place of the wheels that give the speed
+PREVIOUS = _take(4)  # mean rate of a virtual IMU and the length of its interval, see `fuse.average_increments`
+EARTH = _take(5)  # see `earth.evaluate`: geodetic, latitude, its sine and cosine, plane gravity
+SCALARS = _layout.size
+
+# --- places in `Plan.settings`
+(
+    VIRTUAL,  # average the IMUs into one before navigation
+    SHARED_MECHANIZATION,
+    GATE_LIMIT,
+    REOPEN_AFTER,  # rejections in a row
+    SNAP,  # s: an event this near to an epoch is at it
+    LOG_EVERY,  # epochs between rows of the log of IMU errors
+    STRIDE,  # length of a row of P
+    MAY_BE_SILENT,  # whether IMUs may have no data
+    STILL_RATE,  # rad/s: an IMU that turns more does not stand
+    RADIUS,  # m, mean of the wheels that give the speed
+    SPEED_AT_END,  # predict the velocity at the end of a window instead of the mean
+) = range(11)
+SETTINGS = 11
+
+VALUES = measurement.VARIANCE - measurement.VALUE
+"""numbers that the value of an event may have"""
+
+SILENT, MEASURED, COMPLETED = 0, 1, 2
+"""What an IMU has in an epoch: nothing; data; or what those that it is rigidly joined with make of it."""
+
+
+class State(NamedTuple):
+    """What a run remembers."""
+
+    rows: Array
+    """the bank, (rows of eight lanes, bank.SIZE)"""
+    blocks: Array
+    """covariance blocks, and behind them the merged state unless a single block has it, (., see block_size)"""
+    joint: Array
+    """covariance of all blocks together, square; empty unless they are joined"""
+    scalars: Array
+    silent: Array
+    """(2, blocks): since when each is silent, and since when a silent one has data again, s; below zero: not"""
+
+
+class Plan(NamedTuple):
+    """What a run is told."""
+
+    spans: Array
+    """int64 (blocks, 2): first lane of each block and the one after its last"""
+    lenders: Array
+    """int64 (blocks,): the block that lends roll and pitch; -1: none, or on the body"""
+    row_blocks: Array
+    """int64 (rows,): the block of several IMUs that a row belongs to; -1: blocks of one"""
+    speed_variance: Array
+    """(blocks, 3): of the velocity that wheels give, (m/s)^2 forward, right, down"""
+    origin: Array
+    """mean vector from the IMUs to the origin, m, for a virtual one"""
+    settings: Array
+
+
+class Inputs(NamedTuple):
+    """The aligned recording."""
+
+    time: Array
+    """s (T,), the first is the start"""
+    increments: Array
+    """(T, 6, N): dtheta and dvel over the interval that ends at `time`; the first row is only a previous one"""
+    present: Array
+    """uint8 (T, N): what each IMU has; (0, N): all have data throughout"""
+    travel: Array
+    """(T, 2): m that the wheels rolled in the interval that ends at each epoch, NaN where none measures; m to the right
+    of the axle's middle, the mean place of the wheels that do; (0, 2): without wheels"""
+    event_time: Array
+    """s (M,), in order"""
+    event_kind: Array
+    """int8 (M,), see `aiding.kinds`"""
+    event_value: Array
+    """(M, VALUES)"""
+    event_variance: Array
+    """(M, 3), not positive for what is not measured"""
+
+
+class Outputs(NamedTuple):
+    """What a run writes, a row per epoch, event, or row of the log."""
+
+    states: Array
+    """(T, 10): position, velocity, quaternion"""
+    variances: Array
+    """(T, 12): of position and velocity; covariance of phi NN, NE, ND, EE, ED, DD"""
+    event_status: Array
+    """int8 (M,)"""
+    innovations: Array
+    """(M, 7): residual 3, its variance 3, NIS"""
+    log_time: Array
+    """s (K,)"""
+    log: Array
+    """(K, 2, E, N): what is estimated beside the navigation state, and its std"""
+
+
+class Work(NamedTuple):
+    """Arrays that a run computes in; nothing in them is remembered."""
+
+    covariance: Array
+    """(1, .), or a row for each block if they are joined"""
+    sums: Array
+    """(blocks, .), see `fuse`"""
+    updates: Array
+    """(blocks, kalman.SIZE)"""
+    measurement: Array
+    """(measurement.SIZE,)"""
+    vectors: Array
+    """(3, 3, size of the joint covariance): H P, the transposed gain, A H'"""
+    designs: Array
+    """(blocks, 3, size of the joint covariance): of one event's measurements"""
+    residuals: Array
+    """(blocks, 9): residual of each of them, its variances; the block whose members differ from it, or -1"""
+    correction: Array
+    """(size of the joint covariance,): sum of the corrections of one event so far"""
+
+
+class Navigators(NamedTuple):
+    """The bank of navigators: all of a run but its data."""
+
+    state: State
+    plan: Plan
+    work: Work
+
+
+def block_size(stride: int) -> int:
+    """Return the length of a covariance block whose P has rows of that length, in whole vectors of eight."""
+    return -(-(covariance.P + stride * stride) // EIGHT) * EIGHT
+
+
+def empty_state(rows: int, blocks: int, merged: bool, stride: int, joined: bool) -> tuple[Array, State]:
+    """Return the array of all that a run remembers, and the parts of it, which are zero."""
+    joint = blocks * stride if joined else 0
+    shapes = (
+        (rows, bank.SIZE),
+        (blocks + merged, block_size(stride)),
+        (joint, joint),
+        (SCALARS,),
+        (2, blocks),
+    )
+    ends = np.cumsum([-(-math.prod(shape) // EIGHT) * EIGHT for shape in shapes])
+    memory = layout.zeros(int(ends[-1]))
+    parts = [
+        memory[begin : begin + math.prod(shape)].reshape(shape)
+        for shape, begin in zip(shapes, [0, *ends], strict=False)
+    ]
+    return memory, State(*parts)
+
+
+def empty_work(blocks: int, stride: int, joined: bool) -> Work:
+    """Return the work arrays of a run."""
+    joint = blocks * stride if joined else 0
+    return Work(
+        covariance=layout.zeros(blocks if joined else 1, covariance.WORK),
+        sums=layout.zeros(blocks, fuse.SUMS),
+        updates=layout.zeros(blocks, kalman.SIZE),
+        measurement=layout.zeros(measurement.SIZE),
+        vectors=np.zeros((3, 3, joint)),
+        designs=np.zeros((blocks, 3, joint)),
+        residuals=np.zeros((blocks, 9)),
+        correction=np.zeros(joint),
+    )

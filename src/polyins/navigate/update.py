@@ -1,0 +1,402 @@
+"""One measurement and the bank: what every block makes of it, whether it is believed, and what it corrects.
+
+Apart, each block has a gain of its own, paper A (8)-(11), paper B's distributed filter. Joined, one gain corrects all,
+paper B's centralized filter.
+"""
+
+from __future__ import annotations
+
+from polyins.aiding import kinds, vehicle_attitude
+from polyins.aiding.measurement import KIND, METRIC, VARIANCE
+from polyins.kernels import bank, covariance, earth, fuse, joint, kalman, strapdown, vehicle
+from polyins.kernels.bank import LANES
+from polyins.kernels.covariance import LARGEST, P
+from polyins.kernels.jit import Array, scalar_kernel
+from polyins.navigate import window
+from polyins.navigate.state import (
+    EARTH,
+    GATE_LIMIT,
+    INTERVAL,
+    REJECTIONS,
+    REOPEN_AFTER,
+    STRIDE,
+    TIME,
+    Plan,
+    State,
+    Work,
+)
+
+UNUSED, ACCEPTED, REJECTED, REOPENED = 0, 1, 2, 3
+"""What became of a measurement."""
+
+CAUTION = 4.0
+"""The gate takes the standard deviations of the prediction times this: P knows nothing of misaligned chips and the
+like, which in an outage or a bend make errors of many sigma."""
+
+MOST_GROWTH = 100.0
+"""of the covariance when the gate reopens: standard deviations tenfold"""
+
+HP, K, AH = range(3)
+"""places in `Work.vectors`"""
+Z, R, OWNER = 0, 3, 6
+"""places in a row of `Work.residuals`"""
+
+
+@scalar_kernel
+def apply(state: State, plan: Plan, work: Work, innovation: Array) -> int:
+    """Measure with all blocks, write the innovation, and correct them unless the gate rejects it; return its status."""
+    if state.blocks.shape[0] == plan.spans.shape[0]:
+        vehicle.update_attitudes(state.rows, state.blocks, plan.spans, plan.lenders)
+    joined = state.joint.shape[0] > 0
+    rows = _measure_joint(state, plan, work) if joined else _measure_each(state, plan, work)
+    if rows == 0:
+        return UNUSED
+    nis = _record(work, innovation, rows)
+    status = _decide(state, plan, work, rows, nis)
+    if status != REJECTED:
+        if joined:
+            _correct_joint(state, plan, work, rows)
+        else:
+            _correct_each(state, plan, work)
+        window.begin_anew(state, plan, state.scalars[TIME])
+    return status
+
+
+# --- what the blocks make of it ---------------------------------------------------------------------------------------
+
+
+@scalar_kernel
+def measure_block(state: State, plan: Plan, measurement: Array, s: int, update: Array) -> None:
+    """Write design matrix, variances and residuals of a block: each member's own, and their mean."""
+    block, kind = state.blocks[s], int(measurement[KIND])
+    first, last = plan.spans[s, 0], plan.spans[s, 1]
+    lanes, lane = state.rows[first // LANES], first % LANES
+    earth.metric(
+        block[covariance.POSITION : covariance.POSITION + 3],
+        state.scalars[EARTH] != 0.0,
+        measurement[METRIC : METRIC + 3],
+    )
+    kalman.clear(update)
+    kinds.design(block, lanes, lane, measurement, update)
+    if kinds.IN_VEHICLE[kind]:
+        vehicle_attitude.add_own(block, lanes, lane, update)
+    for a in range(kalman.ROWS):
+        own = kind == kinds.WHEEL_SPEED
+        update[kalman.R + a] = plan.speed_variance[s, a] if own else measurement[VARIANCE + a]
+        update[kalman.RESIDUAL + a] = 0.0
+    lent = vehicle.lent_matrix(state.blocks, plan.lenders[s])
+    for i in range(first, last):
+        member, j = state.rows[i // LANES], i % LANES
+        z = kinds.residual(member, j, lent, measurement)
+        for a in range(kalman.ROWS):
+            member[bank.RESIDUAL + a * LANES + j] = z[a] if update[kalman.R + a] > 0.0 else 0.0
+            update[kalman.RESIDUAL + a] += member[bank.WEIGHT + j] * member[bank.RESIDUAL + a * LANES + j]
+    for a in range(kalman.ROWS):
+        if not update[kalman.R + a] > 0.0:
+            _leave_out(update, a)
+
+
+@scalar_kernel
+def _leave_out(update: Array, a: int) -> None:
+    """Let nothing follow from a component."""
+    update[kalman.R + a] = 1.0
+    for k in range(LARGEST):
+        update[kalman.H + a * LARGEST + k] = 0.0
+    for k in range(kalman.ROWS):
+        update[kalman.TURN + 3 * a + k] = 0.0
+
+
+@scalar_kernel
+def _measure_each(state: State, plan: Plan, work: Work) -> int:
+    """Measure with every block that is not silent; return how many those are."""
+    rows = 0
+    for s in range(plan.spans.shape[0]):
+        work.residuals[s, OWNER] = -1.0
+        if state.silent[0, s] < 0.0:
+            update = work.updates[s]
+            measure_block(state, plan, work.measurement, s, update)
+            kalman.gain(state.blocks[s], update, int(plan.settings[STRIDE]))
+            work.residuals[rows, OWNER] = s
+            rows += 1
+    return rows
+
+
+@scalar_kernel
+def _measures(state: State, plan: Plan, s: int) -> bool:
+    """Whether neither the block is silent nor the one that lends roll and pitch to it."""
+    lender = plan.lenders[s]
+    if lender >= 0 and state.silent[0, lender] >= 0.0:
+        return False
+    active: bool = state.silent[0, s] < 0.0
+    return active
+
+
+@scalar_kernel
+def _add_rows(state: State, plan: Plan, s: int, sign: float, update: Array, design: Array) -> None:
+    """Add the design matrix of a block, and of the one that lends to it, to that of all states."""
+    stride = int(plan.settings[STRIDE])
+    for a in range(kalman.ROWS):
+        for k in range(stride):
+            design[a, s * stride + k] += sign * update[kalman.H + a * LARGEST + k]
+    lender = plan.lenders[s]
+    if lender >= 0:
+        vehicle_attitude.write_lent(state.blocks, s, lender, update)
+        for a in range(kalman.ROWS):
+            for k in range(stride):
+                design[a, lender * stride + k] += sign * update[kalman.LENT + a * LARGEST + k]
+
+
+@scalar_kernel
+def _measure_joint(state: State, plan: Plan, work: Work) -> int:
+    """Write design matrices in all states, residuals and variances of what is measured; return how many.
+
+    That is the mean of what all blocks predict where the noise of a measurement is one, what each predicts where it has
+    noise of its own, and otherwise the differences between them.
+    """
+    stride, how = int(plan.settings[STRIDE]), kinds.JOINED[int(work.measurement[KIND])]
+    joint.gather(state.blocks, plan.spans.shape[0], state.joint, stride)
+    rows, count, before = 0, 0, -1
+    for s in range(plan.spans.shape[0]):
+        count += _measures(state, plan, s)
+    for s in range(plan.spans.shape[0]):
+        if not _measures(state, plan, s):
+            continue
+        update = work.updates[s]
+        measure_block(state, plan, work.measurement, s, update)
+        if how == kinds.MEAN:
+            if before < 0:
+                _begin_row(work, 0, -1, update)
+            _add_measured(state, plan, work, s, 0, 1.0 / count)
+            rows = 1
+        elif how == kinds.EACH:
+            _begin_row(work, rows, s, update)
+            _add_measured(state, plan, work, s, rows, 1.0)
+            rows += 1
+        else:
+            if before >= 0:
+                _begin_row(work, rows, -1, update)
+                _add_measured(state, plan, work, s, rows, 1.0)
+                _add_measured(state, plan, work, before, rows, -1.0)
+                rows += 1
+        before = s
+    for row in range(rows):
+        _gain_of_row(state, work, row)
+    return rows
+
+
+@scalar_kernel
+def _begin_row(work: Work, row: int, owner: int, update: Array) -> None:
+    work.designs[row, :, :] = 0.0
+    work.residuals[row, OWNER] = owner
+    for a in range(kalman.ROWS):
+        work.residuals[row, Z + a] = 0.0
+        work.residuals[row, R + a] = update[kalman.R + a]
+
+
+@scalar_kernel
+def _add_measured(state: State, plan: Plan, work: Work, s: int, row: int, factor: float) -> None:
+    _add_rows(state, plan, s, factor, work.updates[s], work.designs[row])
+    for a in range(kalman.ROWS):
+        work.residuals[row, Z + a] += factor * work.updates[s, kalman.RESIDUAL + a]
+
+
+@scalar_kernel
+def _gain_of_row(state: State, work: Work, row: int) -> None:
+    """Write the gain of one measurement, and its residual and S into the work array of that number."""
+    vectors, update = work.vectors, work.updates[row]
+    variances = work.residuals[row, R : R + 3]
+    joint.gain(work.designs[row], variances, state.joint, vectors[HP], vectors[K], update)
+    for a in range(kalman.ROWS):
+        update[kalman.RESIDUAL + a] = work.residuals[row, Z + a]
+
+
+# --- whether it is believed -------------------------------------------------------------------------------------------
+
+
+@scalar_kernel
+def _number(work: Work, row: int, joined: bool) -> int:
+    """Return which work array holds a measurement: apart, that of its block; joined, that of its number."""
+    return row if joined else int(work.residuals[row, OWNER])
+
+
+@scalar_kernel
+def _record(work: Work, innovation: Array, rows: int) -> float:
+    """Write the mean residual and its variance over what was measured, and the mean NIS, which is returned."""
+    joined = work.correction.shape[0] > 0
+    innovation[:] = 0.0
+    for row in range(rows):
+        update = work.updates[_number(work, row, joined)]
+        for a in range(kalman.ROWS):
+            innovation[a] += update[kalman.RESIDUAL + a] / rows
+            innovation[3 + a] += update[kalman.S + 4 * a] / rows
+        innovation[6] += kalman.normalized_innovation_squared(update) / rows
+    nis: float = innovation[6]
+    return nis
+
+
+@scalar_kernel
+def _decide(state: State, plan: Plan, work: Work, rows: int, nis: float) -> int:
+    """Return whether a measurement is accepted, rejected, or believed after several that were rejected."""
+    kind = int(work.measurement[KIND])
+    rejections = REJECTIONS + kind
+    if _passes_gate(plan, work, rows, nis):
+        state.scalars[rejections] = 0.0
+        return ACCEPTED
+    state.scalars[rejections] += 1.0
+    if not kinds.REOPENS[kind] or state.scalars[rejections] <= plan.settings[REOPEN_AFTER]:
+        return REJECTED
+    state.scalars[rejections] = 0.0
+    _reopen(state, plan, work, rows, nis)
+    return REOPENED
+
+
+@scalar_kernel
+def _passes_gate(plan: Plan, work: Work, rows: int, nis: float) -> bool:
+    limit, joined = plan.settings[GATE_LIMIT], work.correction.shape[0] > 0
+    if nis <= limit:
+        return True
+    cautious = 0.0
+    for row in range(rows):
+        cautious += kalman.cautious_innovation_squared(work.updates[_number(work, row, joined)], CAUTION)
+    passes: bool = cautious <= limit * rows
+    return passes
+
+
+@scalar_kernel
+def _reopen(state: State, plan: Plan, work: Work, rows: int, nis: float) -> None:
+    """Let the covariance grow until the measurement, of a position, is believable.
+
+    The filter is surer of itself than it should be, in velocity and attitude as much as in position, so P is scaled
+    as a whole; what is left of a jump that no error of this size explains goes to the position alone, of all blocks.
+    """
+    growth, stride = min(nis / 3.0, MOST_GROWTH), int(plan.settings[STRIDE])
+    if state.joint.shape[0] > 0:
+        size = state.joint.shape[0]
+        for i in range(size):
+            for j in range(size):
+                state.joint[i, j] *= growth
+        _gain_of_row(state, work, 0)
+        if kalman.normalized_innovation_squared(work.updates[0]) > plan.settings[GATE_LIMIT]:
+            for a in range(kalman.ROWS):
+                for i in range(a, size, stride):
+                    for j in range(a, size, stride):
+                        state.joint[i, j] += work.residuals[0, Z + a] ** 2
+            _gain_of_row(state, work, 0)
+        return
+    for row in range(rows):
+        s = int(work.residuals[row, OWNER])
+        block, update = state.blocks[s], work.updates[s]
+        covariance.grow(block, growth, stride)
+        kalman.gain(block, update, stride)
+        if kalman.normalized_innovation_squared(update) > plan.settings[GATE_LIMIT]:
+            for a in range(kalman.ROWS):
+                block[P + a * (stride + 1)] += update[kalman.RESIDUAL + a] ** 2
+            kalman.gain(block, update, stride)
+
+
+# --- what it corrects -------------------------------------------------------------------------------------------------
+
+
+@scalar_kernel
+def _correct_each(state: State, plan: Plan, work: Work) -> None:
+    """Correct each member by its own residual times the gain of its block, dx = K z, paper A (11)."""
+    for s in range(plan.spans.shape[0]):
+        if state.silent[0, s] >= 0.0:
+            continue
+        update = work.updates[s]
+        kalman.update_covariance(state.blocks[s], update, int(plan.settings[STRIDE]))
+        for i in range(plan.spans[s, 0], plan.spans[s, 1]):
+            member_correction(state.rows[i // LANES], i % LANES, update, int(plan.settings[STRIDE]))
+        _feed_back(state, plan, s)
+    update_derived(state, plan, work)
+
+
+@scalar_kernel
+def member_correction(lanes: Array, lane: int, update: Array, stride: int) -> None:
+    """Write K z of one member, whose residual is its own."""
+    r = bank.RESIDUAL + lane
+    z0, z1, z2 = lanes[r], lanes[r + LANES], lanes[r + 2 * LANES]
+    for k in range(min(stride, bank.STATES)):
+        n = kalman.K + kalman.ROWS * k
+        lanes[bank.CORRECTION + k * LANES + lane] = update[n] * z0 + update[n + 1] * z1 + update[n + 2] * z2
+
+
+@scalar_kernel
+def _correct_joint(state: State, plan: Plan, work: Work, rows: int) -> None:
+    """Apply the measurements of one event, all made at the same states, one after the other.
+
+    Each residual is less what the corrections before it explain.
+    """
+    stride, vectors = int(plan.settings[STRIDE]), work.vectors
+    size = state.joint.shape[0]
+    work.correction[:] = 0.0
+    for b in range(state.rows.shape[0]):
+        state.rows[b, bank.CORRECTION : bank.CORRECTION + bank.STATES * LANES] = 0.0
+    for row in range(rows):
+        for a in range(kalman.ROWS):
+            for j in range(size):
+                work.residuals[row, Z + a] -= work.designs[row, a, j] * work.correction[j]
+        _gain_of_row(state, work, row)
+        for s in range(plan.spans.shape[0]):
+            if state.silent[0, s] >= 0.0:
+                vectors[K, :, s * stride : (s + 1) * stride] = 0.0
+        variances = work.residuals[row, R : R + 3]
+        design = work.designs[row]
+        joint.update_covariance(design, variances, state.joint, vectors[HP], vectors[K], vectors[AH])
+        _add_corrections(state, plan, work, row)
+    joint.scatter(state.blocks, plan.spans.shape[0], state.joint, stride)
+    for s in range(plan.spans.shape[0]):
+        if state.silent[0, s] < 0.0:
+            _feed_back(state, plan, s)
+    update_derived(state, plan, work)
+
+
+@scalar_kernel
+def _add_corrections(state: State, plan: Plan, work: Work, row: int) -> None:
+    """Add K z to the corrections of all members; those of the block that measured differ from its mean by their own."""
+    k, z, stride = work.vectors[K], work.residuals[row, Z : Z + 3], int(plan.settings[STRIDE])
+    for j in range(work.correction.shape[0]):
+        work.correction[j] += k[0, j] * z[0] + k[1, j] * z[1] + k[2, j] * z[2]
+    for s in range(plan.spans.shape[0]):
+        if state.silent[0, s] >= 0.0:
+            continue
+        first, last = plan.spans[s, 0], plan.spans[s, 1]
+        own = work.residuals[row, OWNER] == s and last - first > 1
+        m0, m1, m2 = 0.0, 0.0, 0.0
+        if own:
+            for i in range(first, last):
+                lanes, r = state.rows[i // LANES], bank.RESIDUAL + i % LANES
+                weight = lanes[bank.WEIGHT + i % LANES]
+                m0, m1, m2 = m0 + weight * lanes[r], m1 + weight * lanes[r + LANES], m2 + weight * lanes[r + 2 * LANES]
+        for i in range(first, last):
+            lanes, lane = state.rows[i // LANES], i % LANES
+            z0, z1, z2 = z[0], z[1], z[2]
+            if own:
+                r = bank.RESIDUAL + lane
+                z0, z1, z2 = z0 + lanes[r] - m0, z1 + lanes[r + LANES] - m1, z2 + lanes[r + 2 * LANES] - m2
+            for n in range(min(stride, bank.STATES)):
+                j = s * stride + n
+                lanes[bank.CORRECTION + n * LANES + lane] += k[0, j] * z0 + k[1, j] * z1 + k[2, j] * z2
+
+
+@scalar_kernel
+def _feed_back(state: State, plan: Plan, s: int) -> None:
+    """Apply the correction of each member of a block to its state."""
+    block = state.blocks[s]
+    metres = block[covariance.METRIC : covariance.METRIC + 3]
+    place = block[covariance.POSITION : covariance.POSITION + 3]
+    earth.metric(place, state.scalars[EARTH] != 0.0, metres)
+    count = min(int(plan.settings[STRIDE]), bank.STATES)
+    fuse.correct_members(state.rows, plan.spans[s, 0], plan.spans[s, 1], metres, count)
+
+
+@scalar_kernel
+def update_derived(state: State, plan: Plan, work: Work) -> None:
+    """Bring everything that follows from the navigation states up to date."""
+    for b in range(state.rows.shape[0]):
+        strapdown.update_matrix(state.rows[b])
+        strapdown.update_sensitivity(state.rows[b])
+    for s in range(plan.spans.shape[0]):
+        first, last = plan.spans[s, 0], plan.spans[s, 1]
+        fuse.fuse_states(state.rows, first, last, state.blocks[s], work.sums[s], state.scalars[INTERVAL])
+    vehicle.merge(state.rows, state.blocks, plan.spans, plan.lenders)
