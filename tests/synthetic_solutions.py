@@ -59,10 +59,6 @@ def drive(duration: float = 60.0, rate: float = 20.0, begin: float = 1000.0, rol
     return Drive(begin + since, local, velocity, euler)
 
 
-def no_innovations() -> Innovations:
-    return Innovations(*[np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)], *[np.zeros(0, bool)] * 3)
-
-
 def solution(truth: Drive, geodetic: bool = True, imus: int = 1, method: str = "single", **changes: object) -> Solution:
     """The drive itself as a solution, 1 m, 0.1 m/s and 0.01 rad sure, with any field changed."""
     epochs = truth.time.size
@@ -82,7 +78,6 @@ def solution(truth: Drive, geodetic: bool = True, imus: int = 1, method: str = "
         imu_error_time=truth.time[::20],
         imu_errors=np.zeros((truth.time[::20].size, imus, 12)),
         imu_error_std=np.zeros((truth.time[::20].size, imus, 12)),
-        innovations=no_innovations(),
     )
     return replace(made, **changes)
 
@@ -105,7 +100,12 @@ def innovations(time: np.ndarray, seed: int, rejected: tuple[int, ...] = ()) -> 
     accepted = np.ones(time.size, bool)
     accepted[list(rejected)] = False
     nis = np.sum((residual / std) ** 2, axis=1)
-    return Innovations(time, residual, std, nis, accepted, *[np.zeros(time.size, bool)] * 2)
+    never = np.zeros(time.size, bool)
+    return Innovations(time, residual, std, nis, accepted, never, never, np.full(time.size, 3))
+
+
+def of_fixes(shown: Innovations) -> dict[str, Innovations]:
+    return {"GNSS position": shown}
 
 
 def drifting(truth: Drive, method: str, imus: int, scale: float, outages: tuple, seed: int) -> Solution:
@@ -129,7 +129,7 @@ def drifting(truth: Drive, method: str, imus: int, scale: float, outages: tuple,
         position_variance=variance,
         imu_errors=slow,
         imu_error_std=np.ones_like(slow) * spread,
-        innovations=innovations(shown, seed, rejected=(5, 40)),
+        measurements=of_fixes(innovations(shown, seed, rejected=(5, 40))),
         filter_s=0.05 * imus,
         start={"time": truth.time[0], "heading": "from the course over ground", "position": truth.geodetic[0]},
     )

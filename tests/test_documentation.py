@@ -422,6 +422,10 @@ CONFIGURATION: dict[str, type[BaseModel]] = {
     "initial_std": config.InitialStd,
     "gnss": config.GnssEntry,
     "gnss.plane_origin": config.GeodeticPoint,
+    "height": config.HeightEntry,
+    "heading": config.HeadingEntry,
+    "odometer": config.OdometerEntry,
+    "columns of height, heading, odometer": config.SensorColumns,
     "reference": config.ReferenceEntry,
     "columns of positions": config.TrackColumns,
     "columns.time": columns.TimeColumn,
@@ -545,7 +549,10 @@ def test_every_key_is_listed() -> None:
 
 def test_every_model_has_a_table() -> None:
     named = [getattr(config, name) for name in config.__all__]
-    sections = {m for m in named if isinstance(m, type) and issubclass(m, config.Section)} - {config.Section}
+    sections = {m for m in named if isinstance(m, type) and issubclass(m, config.Section)} - {
+        config.Section,
+        config.SensorEntry,
+    }
     assert sections - {config.ImuSettings} <= set(CONFIGURATION.values())
     assert set(config.ImuSettings.model_fields) <= set(config.ImuEntry.model_fields)
 

@@ -260,7 +260,7 @@ EXECUTED = ("mechanization", "prediction", "gain", "feedback", "measurement_fusi
 
 def count_executions(method: str, imus: int) -> dict[str, int]:
     """Return how often the steps of Table II are done in one second with one fix, once for each IMU or block."""
-    from polyins.kernels import bank, covariance, fuse, kalman, strapdown
+    from polyins.kernels import bank, covariance, fuse, kalman, strapdown, vehicle
     from polyins.navigate.state import NEXT_EVENT, TIME
 
     tally = dict.fromkeys(EXECUTED, 0)
@@ -283,6 +283,7 @@ def count_executions(method: str, imus: int) -> dict[str, int]:
     watch(fuse, "correct_members", "feedback", lambda _, first, last, *__: int(last - first))
     watch(fuse, "finish_measurements", "measurement_fusion", lambda *_: imus)
     watch(fuse, "finish_states", "solution_fusion", lambda *_: imus)
+    watch(vehicle, "merge", "solution_fusion", lambda _, blocks, spans, *__: imus * (len(blocks) > len(spans)))
     time, due = prepared.inputs.time, prepared.inputs.event_time
     fix = float(due[due > time[0] + 0.01][0])
     first = int(np.searchsorted(time, fix)) - 1

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from synthetic_solutions import drifting, drive, innovations, moved, reference, solution
+from synthetic_solutions import drifting, drive, innovations, moved, of_fixes, reference, solution
 
 import polyins
 from polyins.evaluation.summary import comparison, summarize
@@ -28,7 +28,7 @@ def off_by(metres: float, inside: tuple[float, float], **changes: object):
 def test_a_run_document_has_all_keys_and_the_figures():
     truth = drive()
     shown = innovations(np.arange(1001.0, 1060.0), 1, rejected=(4,))
-    ours = off_by(3.0, (1015.0, 1016.0), imus=4, method="enav-fusion", filter_s=0.25, innovations=shown,
+    ours = off_by(3.0, (1015.0, 1016.0), imus=4, method="enav-fusion", filter_s=0.25, measurements=of_fixes(shown),
                   warnings=("odd",), start={"heading": np.float64(0.5), "position": np.zeros(3)})  # fmt: skip
     document = summarize(ours, reference(truth), OUTAGES)
     assert set(document) >= KEYS

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from plotted import plotted
-from synthetic_solutions import RADIUS_M, drive, no_innovations
+from synthetic_solutions import RADIUS_M, drive, of_fixes
 
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
 from polyins.report.imu_errors import imu_error_figure
@@ -27,7 +27,7 @@ def blind(made_runs, made_recording) -> Scene:
     bare = replace(made_recording, reference=None, gnss=None, outages=())
     made, summary = made_runs["enav-fusion"]
     nothing = {**summary, "outages": {"count": 0, "length_s": None, "horizontal_max_rms_m": None, "each_m": []}}
-    quiet = replace(made, innovations=no_innovations(), imu_error_time=np.zeros(0), imu_errors=np.zeros((0, 6, 12)))
+    quiet = replace(made, measurements={}, imu_error_time=np.zeros(0), imu_errors=np.zeros((0, 6, 12)))
     return Scene.of({"enav-fusion": (quiet, nothing)}, bare, None)
 
 
@@ -139,7 +139,9 @@ def test_the_fix_after_an_outage_does_not_flatten_the_others(made_runs, made_rec
     residual = shown.residual.copy()
     residual[60, 0] = -500.0
     scene = Scene.of(
-        {"single": (replace(made, innovations=replace(shown, residual=residual)), summary)}, made_recording, None
+        {"single": (replace(made, measurements=of_fixes(replace(shown, residual=residual))), summary)},
+        made_recording,
+        None,
     )
     figure = plotted(innovation_figure(scene))
     assert figure.layout.yaxis.range[1] < 1.0
@@ -151,7 +153,7 @@ def test_the_fix_after_an_outage_does_not_flatten_the_others(made_runs, made_rec
 def test_a_run_that_rejected_every_fix_is_drawn(made_runs, made_recording):
     made, summary = made_runs["single"]
     none = replace(made.innovations, accepted=np.zeros_like(made.innovations.accepted))
-    scene = Scene.of({"single": (replace(made, innovations=none), summary)}, made_recording, None)
+    scene = Scene.of({"single": (replace(made, measurements=of_fixes(none)), summary)}, made_recording, None)
     assert len(named(plotted(innovation_figure(scene)), "rejected")) == 3
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plotted import plotted
-from synthetic_solutions import drifting, drive, no_innovations, recording, reference
+from synthetic_solutions import drifting, drive, recording, reference
 
 from polyins.evaluation.summary import comparison, on_wheels, summarize
 from polyins.model.attitude import rotation_matrices
@@ -43,7 +43,7 @@ def runs(driven: Recording) -> dict:
     solutions = {}
     for seed, (name, imus) in enumerate(METHODS.items()):
         made = drifting(TRUTH, name, imus, 0.05, ((1050.0, 1090.0),), seed)
-        solutions[name] = replace(made, innovations=no_innovations())
+        solutions[name] = replace(made, measurements={})
     return {name: (made, summarize(made, driven.reference)) for name, made in solutions.items()}
 
 

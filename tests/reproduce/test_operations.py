@@ -73,6 +73,7 @@ def test_the_engine_does_what_the_table_says_but_for_the_split_interval(
             assert executions[method][step] == row[step] // 200 * 201
     assert executions["enav-fusion"]["measurement_fusion"] == 201 * imus
     assert executions["enav-fusion"]["solution_fusion"] == 202 * imus
+    assert executions["nav-fusion"]["solution_fusion"] == 202 * imus
 
 
 PAGE = Path(__file__).parents[2] / "docs" / "paper-a.md"

@@ -9,7 +9,6 @@ from polyins.aiding import heading, height, odometer, point, velocity, wheel_spe
 from polyins.aiding.measurement import KIND
 from polyins.kernels import vehicle
 from polyins.kernels.jit import Array, scalar_kernel
-from polyins.model import states
 
 (
     GNSS_POSITION,
@@ -45,8 +44,8 @@ class Kind:
     """whether after several rejections in a row the next one is believed and the covariance grows to match"""
     in_vehicle: bool = False
     """whether it depends on the attitude of the vehicle, beyond that of the IMU"""
-    estimates: tuple[str, ...] = ()
-    """states that only exist where there is such a measurement"""
+    offset: str = ""
+    """the state that stands for its sensor's offset or scale"""
 
 
 NORTH_EAST_DOWN, FORWARD_RIGHT_DOWN = ("north", "east", "down"), ("forward", "right", "down")
@@ -58,9 +57,9 @@ KINDS = (
     Kind("reference point", "m", NORTH_EAST_DOWN, joined=DIFFERENCES, in_vehicle=True),
     Kind("zero velocity", "m/s", NORTH_EAST_DOWN, joined=EACH),
     Kind("zero rate", "rad/s", ("x", "y", "z"), joined=EACH),
-    Kind("height", "m", ("down",), in_vehicle=True, estimates=("height_bias",)),
-    Kind("heading", "rad", ("about down",), in_vehicle=True, estimates=("heading_offset",)),
-    Kind("odometer", "m/s", FORWARD_RIGHT_DOWN, in_vehicle=True),
+    Kind("height", "m", ("down",), in_vehicle=True, offset="height_bias"),
+    Kind("heading", "rad", ("about down",), in_vehicle=True, offset="heading_offset"),
+    Kind("odometer", "m/s", FORWARD_RIGHT_DOWN, in_vehicle=True, offset="speed_scale"),
     # not a measurement: from here on the mean speed of the next one is taken
     Kind("window", "", ()),
 )
@@ -70,12 +69,9 @@ REOPENS = tuple(kind.reopens for kind in KINDS)
 IN_VEHICLE = tuple(kind.in_vehicle for kind in KINDS)
 
 
-def states_for(kinds: set[int], mounting: bool) -> int:
-    """Return how many error states a filter needs: the IMU's own, those of its mounting, and those of the kinds."""
-    wanted = {name for kind in kinds for name in KINDS[kind].estimates} | ({"mount"} if mounting else set())
-    last = max(wanted, key=states.place, default="mount")
-    size = {row.name: row.size for row in states.TABLE}
-    return states.place(last) + size[last]
+def number(name: str) -> int:
+    """Return the place of a kind in the table."""
+    return [kind.name for kind in KINDS].index(name)
 
 
 @scalar_kernel

@@ -21,6 +21,7 @@ from polyins.config.file import Config, Filter, parse, validated
 from polyins.config.imu import NOISE_GRADES, ImuEntry, ImuSettings, InitialErrors, InitialStd, Noise
 from polyins.config.positions import GeodeticPoint, GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling, SpinAxis, WheelEntry
+from polyins.config.sensors import HeadingEntry, HeightEntry, OdometerEntry, SensorColumns, SensorEntry
 from polyins.config.timing import Outages, OutageSchedule, Start, StartPosition
 
 __all__ = [
@@ -33,6 +34,8 @@ __all__ = [
     "GnssEntry",
     "GyroColumns",
     "HeadingColumn",
+    "HeadingEntry",
+    "HeightEntry",
     "ImuColumns",
     "ImuEntry",
     "ImuSettings",
@@ -41,6 +44,7 @@ __all__ = [
     "Noise",
     "NotNegative",
     "Number",
+    "OdometerEntry",
     "OutageSchedule",
     "Outages",
     "Pair",
@@ -52,6 +56,8 @@ __all__ = [
     "Rolling",
     "RowChoice",
     "Section",
+    "SensorColumns",
+    "SensorEntry",
     "SpinAxis",
     "Spread",
     "Start",

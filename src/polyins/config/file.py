@@ -12,6 +12,7 @@ from polyins.config.fields import AT_KEY, Positive, Section, number
 from polyins.config.imu import ImuEntry, ImuSettings
 from polyins.config.positions import GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling
+from polyins.config.sensors import HeadingEntry, HeightEntry, OdometerEntry
 from polyins.config.timing import Outages, Start
 from polyins.config.yaml_document import Document, Key
 from polyins.errors import InputError
@@ -48,6 +49,12 @@ class Config(Section):
     """the IMUs of the array"""
     gnss: GnssEntry | None = None
     """the positions that aid the filter"""
+    height: HeightEntry | None = None
+    """heights of a barometer, or known ones"""
+    heading: HeadingEntry | None = None
+    """headings of two antennas, a compass or another system"""
+    odometer: OdometerEntry | None = None
+    """speeds of an encoder; that the vehicle does not slip"""
     reference: ReferenceEntry | None = None
     """what the solution is judged by"""
     start: Start = Start()

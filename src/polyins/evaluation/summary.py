@@ -102,6 +102,12 @@ def document(
         "drift": drift(errors),
         "consistency": consistent,
         "gnss": _gnss(solution.innovations),
+        "measurements": {name: _measured(one) for name, one in solution.measurements.items()},
+        "offsets": {
+            name: {"estimate": float(one.value[-1]), "std": float(one.std[-1])}
+            for name, one in solution.offsets.items()
+            if one.value.size
+        },
         "start": solution.start,
         "faults": list(solution.faults),
         "mounting": _mounting(solution),
@@ -223,6 +229,18 @@ def _gnss(innovations: Innovations) -> Document:
         "reopened": int(np.count_nonzero(innovations.reopened)),
         "velocities_rejected": int(np.count_nonzero(innovations.velocity_rejected)),
         "rejected_times_s": innovations.time[rejected],
+    }
+
+
+def _measured(innovations: Innovations) -> Document:
+    """Count what became of the measurements of one kind; the NIS of the accepted, per degree of freedom."""
+    accepted = innovations.accepted
+    degrees = int(innovations.rows[accepted].sum())
+    return {
+        "count": innovations.time.size,
+        "rejected": int(np.count_nonzero(~accepted)),
+        "reopened": int(np.count_nonzero(innovations.reopened)),
+        "mean_nis": float(innovations.nis[accepted].sum() / degrees) if degrees else None,
     }
 
 

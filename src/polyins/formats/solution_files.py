@@ -17,7 +17,7 @@ from polyins.formats.arrow_arrays import texts_to_arrow, to_arrow, to_numpy
 from polyins.formats.documents import plain
 from polyins.model.attitude import euler_angles, euler_variance, quaternions
 from polyins.model.geodesy import displacement
-from polyins.model.solution import Innovations, Solution
+from polyins.model.solution import Solution
 from polyins.version import __version__
 
 if TYPE_CHECKING:
@@ -113,7 +113,6 @@ def read_solution(path: Path) -> Solution:
         imu_error_time=error_time,
         imu_errors=errors,
         imu_error_std=np.full_like(errors, np.nan),
-        innovations=_no_innovations(),
         start=metadata.get("start", {}),
         filter_s=metadata.get("filter_s", 0.0),
         first_call_s=metadata.get("first_call_s", 0.0),
@@ -261,8 +260,3 @@ def _read_imu_errors(path: Path, names: tuple[str, ...]) -> tuple[tuple[str, ...
         raise InputError(f"{path}: {time.size} rows of {len(present)} IMUs; expected one row of each IMU per time")
     errors = _table(table, IMU_ERROR_COLUMNS, path).reshape(-1, len(present), 12)
     return present, time[:: len(present)], errors
-
-
-def _no_innovations() -> Innovations:
-    none, no_rows, never = np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=bool)
-    return Innovations(none, no_rows, no_rows, none, never, never, never)

@@ -61,6 +61,21 @@ class GnssStream:
 
 
 @dataclass(frozen=True)
+class AidingStream:
+    """What a sensor beside IMUs and GNSS says of the vehicle; where it sits stands in the rig."""
+
+    kind: str
+    """height, heading or odometer"""
+    time: Array
+    """s, shape (M,)"""
+    value: Array
+    """height as in the module's docstring, m; heading, rad; forward speed, m/s; shape (M,)"""
+    std: Array
+    """of the value, shape (M, 1); of an odometer that of forward, right and down, m/s, shape (M, 3); zero: not measured
+    """
+
+
+@dataclass(frozen=True)
 class Reference:
     """What the solution is judged by; what the reference system does not give is None."""
 
@@ -130,6 +145,16 @@ class RollingOptions:
 
 
 @dataclass(frozen=True)
+class NonholonomicOptions:
+    """That the vehicle moves neither sideways nor up, at the place of the odometer, as a measurement of its own."""
+
+    interval: float = 0.5
+    """s, from one to the next; the shorter, the more it weighs"""
+    std: Array = field(default_factory=lambda: np.array([0.1, 0.1]))
+    """m/s right, down; the larger, the more slip is allowed for"""
+
+
+@dataclass(frozen=True)
 class FilterOptions:
     """What the filter is told beyond the rig."""
 
@@ -144,6 +169,8 @@ class FilterOptions:
     gravity: float = 9.80665
     """m/s^2, on a local tangent plane only."""
     rolling: RollingOptions = RollingOptions()
+    nonholonomic: NonholonomicOptions | None = None
+    """None: it is not assumed"""
 
 
 @dataclass(frozen=True)
@@ -178,6 +205,8 @@ class Recording:
     warnings: tuple[str, ...] = ()
     clock_offsets: tuple[Offset, ...] = ()
     """what was found where the configuration says `time_offset: estimate`"""
+    aiding: tuple[AidingStream, ...] = ()
+    """what sensors beside IMUs and GNSS say"""
 
     def subset(self, indices: Iterable[int]) -> Recording:
         """Return the recording with just the IMUs of those indices."""

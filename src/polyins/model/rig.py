@@ -193,12 +193,31 @@ class Imu:
 
 
 @dataclass(frozen=True)
+class AidingSensor:
+    """A barometer, a compass, an odometer: where it measures, and what the filter estimates of its error."""
+
+    kind: str
+    """height, heading or odometer"""
+    position: Vector = field(default_factory=zero_vector)
+    """the point whose height or velocity it shows, m in the array frame"""
+    offset_std: float = 0.0
+    """at the start; of a height m, of a heading rad, of an odometer relative; above zero the filter estimates it"""
+    offset_random_walk: float = 0.0
+    """the same unit per sqrt(s): the larger, the faster the estimate may follow a drift"""
+
+    def __post_init__(self) -> None:
+        check_lever_arm(f"{self.kind}: position", self.position)
+
+
+@dataclass(frozen=True)
 class Rig:
-    """The array: its IMUs and the GNSS antenna."""
+    """The array: its IMUs, the GNSS antenna, and what else measures."""
 
     imus: tuple[Imu, ...]
     antenna: Vector = field(default_factory=zero_vector)
     """Position of the GNSS antenna in the array frame, m."""
+    sensors: tuple[AidingSensor, ...] = ()
+    """at most one of each kind"""
 
     def __post_init__(self) -> None:
         check_lever_arm("antenna: position", self.antenna)
@@ -213,6 +232,10 @@ class Rig:
     def has_wheels(self) -> bool:
         """Whether there is an IMU on a wheel."""
         return any(imu.wheel is not None for imu in self.imus)
+
+    def sensor(self, kind: str) -> AidingSensor:
+        """Return the sensor of a kind, or one at the array origin that has no error beyond its noise."""
+        return next((one for one in self.sensors if one.kind == kind), AidingSensor(kind))
 
     def modules(self) -> dict[str, list[int]]:
         """Return the indices of the IMUs of each module, by the module's name."""

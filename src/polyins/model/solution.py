@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,22 +14,56 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Innovations:
-    """One row per GNSS fix that the filter was shown (fixes inside outages are not)."""
+    """One row per measurement of a kind that the filter was shown (fixes inside outages are not)."""
 
     time: Array
     """s, shape (M,)"""
     residual: Array
-    """predicted minus measured position, m north, east, down, shape (M, 3)"""
+    """predicted minus measured, in `unit` along `axes`, shape (M, A)"""
     std: Array
-    """predicted standard deviation of the residual, m, shape (M, 3)"""
+    """predicted standard deviation of the residual, shape (M, A)"""
     nis: Array
-    """normalized innovation squared, three degrees of freedom, shape (M,)"""
+    """normalized innovation squared, shape (M,)"""
     accepted: NDArray[np.bool_]
-    """False where the gate rejected the fix, shape (M,)"""
+    """False where the gate rejected the measurement, shape (M,)"""
     reopened: NDArray[np.bool_]
-    """True where a fix was believed because it followed a run of rejections, shape (M,)"""
+    """True where it was believed because it followed a run of rejections, shape (M,)"""
     velocity_rejected: NDArray[np.bool_]
-    """True where the position was accepted and the velocity of the same fix was not, shape (M,)"""
+    """True where a position was accepted and the velocity of the same fix was not, shape (M,)"""
+    rows: NDArray[np.intp]
+    """degrees of freedom of the NIS, shape (M,)"""
+    axes: tuple[str, ...] = ("north", "east", "down")
+    unit: str = "m"
+
+    def until(self, time: float) -> Innovations:
+        """Return those up to a time, s."""
+        kept = self.time <= time
+        names = ("time", "residual", "std", "nis", "accepted", "reopened", "velocity_rejected", "rows")
+        return replace(self, **{name: getattr(self, name)[kept] for name in names})
+
+
+_NEVER = np.zeros(0, dtype=bool)
+NO_INNOVATIONS = Innovations(
+    time=np.zeros(0),
+    residual=np.zeros((0, 3)),
+    std=np.zeros((0, 3)),
+    nis=np.zeros(0),
+    accepted=_NEVER,
+    reopened=_NEVER,
+    velocity_rejected=_NEVER,
+    rows=np.zeros(0, dtype=np.intp),
+)
+"""of a run without fixes"""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """What was estimated of the offset or scale of a sensor, one row per log entry."""
+
+    value: Array
+    """shape (K,), the unit of its state, see `model.states`"""
+    std: Array
+    """shape (K,)"""
 
 
 @dataclass(frozen=True)
@@ -64,7 +98,10 @@ class Solution:
     """gyro bias rad/s, accelerometer bias m/s^2, gyro scale, accelerometer scale; shape (K, N, 12)"""
     imu_error_std: Array
     """shape (K, N, 12)"""
-    innovations: Innovations
+    measurements: dict[str, Innovations] = field(default_factory=dict)
+    """what became of the measurements, by the name of their kind, see `aiding.kinds`"""
+    offsets: dict[str, Offset] = field(default_factory=dict)
+    """of height, heading and odometer, where the filter estimates them; times are `imu_error_time`"""
     mounting: Array | None = None
     """with wheels: estimated relative error of the wheel speed, and of a wheel's lever arm y and z (m) or of a body's
     mount pitch and yaw (rad), shape (K, N, 3)"""
@@ -79,3 +116,8 @@ class Solution:
     first_call_s: float = 0.0
     """time spent on compiling or loading the kernels"""
     warnings: tuple[str, ...] = ()
+
+    @property
+    def innovations(self) -> Innovations:
+        """What became of the GNSS positions."""
+        return self.measurements.get("GNSS position", NO_INNOVATIONS)

@@ -14,7 +14,8 @@ from polyins.errors import InputError
 from polyins.kernels import dense
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
-from polyins.model.solution import Innovations, Solution
+from polyins.model.solution import Innovations, Offset, Solution
+from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.navigate import engine, events, layout, update
 from polyins.navigate import start as search
 from polyins.navigate import state as places
@@ -174,7 +175,8 @@ def lay_out(
 
 def logged_errors(recording: Recording) -> int:
     """Return how many of the errors that are estimated go into the log."""
-    return layout.states_of(recording) - 9 if recording.rig.has_wheels else 12
+    rig = recording.rig
+    return layout.states_of(rig) - NAVIGATION if rig.has_wheels or rig.sensors else IMU_ERRORS
 
 
 def inputs_of(
@@ -195,7 +197,7 @@ def inputs_of(
     schedule = schedule_of(choice, recording, start)
     lateral = travel[1:, 1] if len(travel) else np.zeros(len(intervals) - 1)
     due = schedule.events(aligned.time[1:], intervals[1:], lateral)
-    queue = events.merged(events.scheduled(due, aligned.time[1:], recording.options), shown)
+    queue = events.merged(events.scheduled(due, aligned.time[1:], recording.options, recording.rig), shown)
     return Inputs(aligned.time, np.ascontiguousarray(whole.increments[:, :, order]), present, travel, *queue)
 
 
@@ -210,7 +212,7 @@ def present_of(recording: Recording, missing: NDArray[np.bool_]) -> NDArray[np.u
 def schedule_of(choice: Choice, recording: Recording, start: Start) -> wheels.Schedule:
     """Return when a run measures by itself."""
     several = len(choice.blocks) > 1 and recording.rig.has_wheels
-    return wheels.Schedule(start.time, recording.options.rolling, wheels=bool(choice.speed), several=several)
+    return wheels.Schedule(start.time, recording.options, wheels=bool(choice.speed), several=several)
 
 
 def empty_outputs(epochs: int, count: int, imus: int, plan: Plan, errors: int) -> Outputs:
@@ -249,7 +251,8 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         imu_error_time=outputs.log_time,
         imu_errors=log[:, 0, :, :12],
         imu_error_std=log[:, 1, :, :12],
-        innovations=innovations_of(run),
+        measurements=innovations_of(run),
+        offsets=offsets_of(run, lanes),
         mounting=log[:, 0, :, 12:15] if recording.rig.has_wheels else None,
         mounting_std=log[:, 1, :, 12:15] if recording.rig.has_wheels else None,
         faults=silences(run.choice, recording, aligned) if recording.rig.has_wheels else (),
@@ -260,23 +263,44 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
     )
 
 
-def innovations_of(run: Prepared) -> Innovations:
-    """Return what became of the GNSS positions."""
-    queue = Events(*run.inputs[4:8])
-    shown = np.flatnonzero(queue.kind == kinds.GNSS_POSITION)
-    status = run.outputs.event_status[shown]
-    rows = run.outputs.innovations[shown]
+def innovations_of(run: Prepared) -> dict[str, Innovations]:
+    """Return what became of the measurements, by kind; of GNSS positions in any case."""
+    queue, outputs = Events(*run.inputs[4:8]), run.outputs
     velocity = np.flatnonzero(queue.kind == kinds.GNSS_VELOCITY)
-    lost = queue.time[velocity][run.outputs.event_status[velocity] == update.REJECTED]
-    return Innovations(
-        time=queue.time[shown],
-        residual=rows[:, 0:3],
-        std=np.sqrt(rows[:, 3:6]),
-        nis=rows[:, 6],
-        accepted=status != update.REJECTED,
-        reopened=status == update.REOPENED,
-        velocity_rejected=np.isin(queue.time[shown], lost),
-    )
+    lost = queue.time[velocity][outputs.event_status[velocity] == update.REJECTED]
+    found = {}
+    for number, kind in enumerate(kinds.KINDS):
+        shown = np.flatnonzero((queue.kind == number) & (outputs.event_status != update.UNUSED))
+        if number == kinds.GNSS_POSITION:
+            shown = np.flatnonzero(queue.kind == number)
+        elif not len(shown) or not kind.axes:
+            continue
+        status, rows, axes = outputs.event_status[shown], outputs.innovations[shown], len(kind.axes)
+        of_fix = number == kinds.GNSS_POSITION
+        found[kind.name] = Innovations(
+            time=queue.time[shown],
+            residual=rows[:, :axes],
+            std=np.sqrt(rows[:, 3 : 3 + axes]),
+            nis=rows[:, 6],
+            accepted=status != update.REJECTED,
+            reopened=status == update.REOPENED,
+            velocity_rejected=np.isin(queue.time[shown], lost) if of_fix else np.zeros(len(shown), dtype=bool),
+            rows=(queue.variance[shown] > 0.0).sum(axis=1),
+            axes=kind.axes,
+            unit=kind.unit,
+        )
+    return found
+
+
+def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, Offset]:
+    """Return what was estimated of the sensors' offsets and scales, by the state's name."""
+    found = {}
+    for sensor in run.recording.rig.sensors:
+        if sensor.offset_std > 0.0:
+            name = layout.offset_of(sensor)
+            log = run.outputs.log[:, :, place(name) - NAVIGATION][:, :, lanes]
+            found[name] = Offset(log[:, 0].mean(axis=1), log[:, 1].mean(axis=1))
+    return found
 
 
 def silences(choice: Choice, recording: Recording, aligned: Aligned) -> tuple[str, ...]:

@@ -52,7 +52,7 @@ class Made:
     counts: dict[str, int]
     first: Epoch | None
     """of which the run begins, as long as there is only one"""
-    due: tuple[float, float, bool] | None
+    due: tuple[float, float, float, bool] | None
     """what the schedule of its own measurements remembers"""
 
 

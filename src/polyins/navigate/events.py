@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polyins.aiding import kinds
-from polyins.model.recording import FilterOptions, Recording
-from polyins.model.rig import DEG
+from polyins.errors import InputError
+from polyins.model.recording import AidingStream, FilterOptions, Recording
+from polyins.model.rig import DEG, Rig
 from polyins.navigate.state import VALUES
 from polyins.prepare.wheels import Scheduled
 
 Array = NDArray[np.float64]
 
+SENSORS = ("height", "heading", "odometer")
 ZERO_VELOCITY_STD = 0.01  # m/s
 ZERO_RATE_STD = 0.05 * DEG  # rad/s, of the mean over a window; an idling engine shakes more than gyros are noisy
 
@@ -86,10 +88,18 @@ def _streams(recording: Recording) -> list[Events]:
         if gnss.velocity is not None and gnss.velocity_std is not None:
             velocities = of_point(kinds.GNSS_VELOCITY, gnss.time, gnss.velocity, antenna, gnss.velocity_std)
             found.append(velocities.at(shown & (gnss.velocity_std > 0.0).any(axis=1)))
-    return found
+    return found + [of_sensor(stream, recording.rig) for stream in recording.aiding]
 
 
-def scheduled(due: Scheduled, time: Array, options: FilterOptions) -> Events:
+def of_sensor(stream: AidingStream, rig: Rig) -> Events:
+    """Return what a sensor of the rig says; raises InputError for a kind that there is not."""
+    if stream.kind not in SENSORS:
+        raise InputError(f"{stream.kind}: is not a kind of sensor; expected {', '.join(SENSORS)}")
+    place = rig.sensor(stream.kind).position
+    return of_point(kinds.number(stream.kind), stream.time, stream.value[:, None], place, stream.std)
+
+
+def scheduled(due: Scheduled, time: Array, options: FilterOptions, rig: Rig) -> Events:
     """Return what a schedule says as events of epochs with these stamps: before all else that is at the same epoch."""
     epochs = np.array([epoch for epoch, _, _ in due], dtype=np.intp)
     kind = np.array([kind for _, kind, _ in due], dtype=np.int8)
@@ -97,5 +107,10 @@ def scheduled(due: Scheduled, time: Array, options: FilterOptions) -> Events:
     std[kind == kinds.ZERO_VELOCITY] = ZERO_VELOCITY_STD
     std[kind == kinds.ZERO_RATE] = ZERO_RATE_STD
     std[kind == kinds.REFERENCE_POINT] = options.rolling.constraint_std
-    values = np.array([[value] for _, _, value in due]).reshape(-1, 1)
+    values = np.zeros((len(due), 6))
+    values[:, 0] = [value for _, _, value in due]
+    if options.nonholonomic is not None:
+        assumed = kind == kinds.ODOMETER
+        std[assumed] = [0.0, *options.nonholonomic.std]
+        values[assumed, 3:] = rig.sensor("odometer").position
     return events(kinds.WINDOW, time[epochs] - options.gnss_snap, values, std)._replace(kind=kind)

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.aiding.kinds import KINDS, number
 from polyins.kernels import bank, covariance
 from polyins.kernels.bank import LANES
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.methods import Method
 from polyins.model.recording import FilterOptions, Recording
-from polyins.model.rig import DEG, Imu, NoiseGrade, Rig
+from polyins.model.rig import DEG, AidingSensor, Imu, NoiseGrade, Rig
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place, stride_for
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice
@@ -107,7 +108,7 @@ def lay_out(
     count, rig = len(seats.spans), recording.rig
     joined = row.joined and count > 1
     merged = count > 1 or rig.has_wheels
-    stride = stride_for(states_of(recording))
+    stride = stride_for(states_of(recording.rig))
     rows = -(-len(seats.members) // LANES)
     memory, state = empty_state(rows, count, merged, stride, joined)
     _fill_lanes(state.rows, seats, recording, start, first / interval)
@@ -121,9 +122,15 @@ def lay_out(
     return memory, Navigators(state, plan, empty_work(count, stride, joined))
 
 
-def states_of(recording: Recording) -> int:
-    """Return how many error states the filters of a recording have."""
-    return place("mount") + 2
+def states_of(rig: Rig) -> int:
+    """Return how many error states the filters of a rig have: up to the last that is estimated."""
+    offsets = [place(offset_of(sensor)) + 1 for sensor in rig.sensors if sensor.offset_std > 0.0]
+    return max([place("mount") + 2, *offsets])
+
+
+def offset_of(sensor: AidingSensor) -> str:
+    """Return the name of the state that stands for a sensor's offset or scale."""
+    return KINDS[number(sensor.kind)].offset
 
 
 def _fill_lanes(rows: Array, seats: Bank, recording: Recording, start: Start, rates: Array) -> None:
@@ -161,13 +168,18 @@ def _fill_lanes(rows: Array, seats: Bank, recording: Recording, start: Start, ra
 def _fill_block(block: Array, members: tuple[Member, ...], recording: Recording, choice: Choice, start: Start) -> None:
     """Give a block the noise of its mean member, and what is known of it at the start."""
     noise = NoiseGrade.typical([member.imu.noise for member in members])
-    std = np.zeros(stride_for(states_of(recording)))
+    std = np.zeros(stride_for(states_of(recording.rig)))
     std[:NAVIGATION] = np.concatenate([start.position_std, start.velocity_std, start.attitude_std])
     errors = slice(NAVIGATION, NAVIGATION + IMU_ERRORS)
     std[errors] = np.sqrt(np.mean([member.error_std**2 for member in members], axis=0))
     std[place("speed_scale")], std[place("mount") : place("mount") + 2] = mounting_std(
         members[0].imu, [recording.rig.imus[module[0]] for module in choice.speed]
     )
+    for sensor in recording.rig.sensors:
+        if sensor.offset_std > 0.0:
+            offset = place(offset_of(sensor))
+            std[offset] = sensor.offset_std
+            block[covariance.ERROR_PSD + offset - NAVIGATION] = sensor.offset_random_walk**2
     for i, one in enumerate(std):
         block[covariance.P + i * (len(std) + 1)] = one**2
     block[covariance.ERROR_PSD : covariance.ERROR_PSD + IMU_ERRORS] = (

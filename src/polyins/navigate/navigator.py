@@ -16,7 +16,7 @@ from polyins.aiding import kinds
 from polyins.errors import InputError
 from polyins.model.attitude import euler_angles, euler_variance
 from polyins.model.methods import find_method
-from polyins.model.recording import FilterOptions, Recording
+from polyins.model.recording import AidingStream, FilterOptions, Recording
 from polyins.model.rig import Rig
 from polyins.navigate import batch, checkpoint, events
 from polyins.navigate.checkpoint import Made
@@ -166,6 +166,16 @@ class Navigator:
             fix.append(events.of_point(kinds.GNSS_VELOCITY, time, velocity, antenna, velocity_std))
         self._measure(*fix)
 
+    def aid(self, kind: str, time: float, value: float, std: ArrayLike) -> None:
+        """Take what a sensor of the rig shows: a height in m, a heading in rad, or the speed of an odometer in m/s.
+
+        `std`: of the value; of an odometer that of forward, right and down, m/s, where zero is not measured. It may
+        come `delay` seconds late. What cannot be taken is counted in `counts`. Raises InputError for another kind.
+        """
+        stds = np.atleast_1d(np.asarray(std, dtype=np.float64))
+        stream = AidingStream(kind, np.array([time]), np.array([value], dtype=np.float64), stds[None])
+        self._measure(events.of_sensor(stream, self._recording.rig))
+
     def flush(self) -> None:
         """Take everything that still waits: there are no more data."""
         self._step(at_end=True)
@@ -309,7 +319,7 @@ class Navigator:
             increments[:, self._order],
             present[self._order],
             travel[0],
-            events.scheduled(due, stamp, self._recording.options),
+            events.scheduled(due, stamp, self._recording.options, rig),
         )
 
     def _measure(self, *measurements: Events) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.aiding import kinds
-from polyins.model.recording import RollingOptions
+from polyins.model.recording import FilterOptions
 from polyins.model.rig import Rig
 
 Array = NDArray[np.float64]
@@ -50,27 +50,28 @@ def mean_radius(rig: Rig, speed: Sequence[Sequence[int]]) -> float:
 
 
 class Schedule:
-    """When a bank measures by itself: the speed of its wheels, standstills, and where its blocks are to each other.
+    """When a bank measures by itself: its wheels' speed, standstills, where its blocks are to each other, no slip.
 
     Epochs come in pieces of any length.
     """
 
-    def __init__(self, start: float, options: RollingOptions, *, wheels: bool, several: bool) -> None:
+    def __init__(self, start: float, options: FilterOptions, *, wheels: bool, several: bool) -> None:
         """`start`: s; `wheels`: whether some give the speed; `several`: whether there are several blocks to compare."""
-        self._options = options
+        self._options = options.rolling
+        self._assumed = options.nonholonomic
         self._wheels = wheels
         self._several = several
-        self._last_speed = self._last_point = start
+        self._last_speed = self._last_point = self._last_assumed = start
         self._open = False
 
     @property
-    def memory(self) -> tuple[float, float, bool]:
-        """When it measured last, s, the speed and the reference point, and whether a window is open."""
-        return self._last_speed, self._last_point, self._open
+    def memory(self) -> tuple[float, float, float, bool]:
+        """When it last measured speed, reference point and no slip, s, and whether a window is open."""
+        return self._last_speed, self._last_point, self._last_assumed, self._open
 
     @memory.setter
-    def memory(self, value: tuple[float, float, bool]) -> None:
-        self._last_speed, self._last_point, self._open = value
+    def memory(self, value: tuple[float, float, float, bool]) -> None:
+        self._last_speed, self._last_point, self._last_assumed, self._open = value
 
     def events(self, time: Array, intervals: Array, lateral: Array) -> Scheduled:
         """Return what is due in further epochs: stamps, s, their intervals, and the place of the speed there, (T,)."""
@@ -79,6 +80,8 @@ class Schedule:
         found = self._speeds(time, reach, lateral) if self._wheels else []
         if self._several:
             found += self._points(time, reach)
+        if self._assumed is not None:
+            found += self._no_slips(time, reach, self._assumed.interval)
         return sorted(found, key=lambda event: event[0])
 
     def _speeds(self, time: Array, reach: Array, lateral: Array) -> Scheduled:
@@ -106,4 +109,11 @@ class Schedule:
         while (k := int(np.searchsorted(reach, self._last_point + self._options.constraint_interval))) < len(time):
             found.append((k, kinds.REFERENCE_POINT, 0.0))
             self._last_point = float(time[k])
+        return found
+
+    def _no_slips(self, time: Array, reach: Array, interval: float) -> Scheduled:
+        found: Scheduled = []
+        while (k := int(np.searchsorted(reach, self._last_assumed + interval))) < len(time):
+            found.append((k, kinds.ODOMETER, 0.0))
+            self._last_assumed = float(time[k])
         return found

@@ -18,6 +18,7 @@ from polyins.model.rig import Imu, Rig
 from polyins.reading import catalogue, clocks
 from polyins.reading.imu_stream import as_mounted, read_imu
 from polyins.reading.position_stream import read_gnss, read_reference
+from polyins.reading.sensor_stream import constraint_of, entries, read_sensors, sensors_of
 from polyins.reading.timing import outage_intervals, start_options
 
 Settings = tuple[Config, Document, tuple[str, ...]]
@@ -130,6 +131,8 @@ def assemble(
         notes += texts
     if config.start.position:
         geodetic = _one_kind(geodetic, config.start.position.geodetic, document.place(["start", "position"]))
+    aiding, texts = read_sensors(config, document, span)
+    notes += texts
     start, texts = start_options(config.start, document, span)
     return Recording(
         _rig(config, document, imus),
@@ -142,6 +145,7 @@ def assemble(
         options=_filter_options(config),
         name=config.name,
         warnings=(*notes, *texts),
+        aiding=aiding,
     )
 
 
@@ -187,7 +191,12 @@ def _not_live(config: Config) -> list[str]:
 
 def _rig(config: Config, document: Document, imus: tuple[Imu, ...]) -> Rig:
     with document.at(["gnss", "antenna_position_m"]):
-        return Rig(imus, np.array(config.gnss.antenna_position_m) if config.gnss else np.zeros(3))
+        antenna = np.array(config.gnss.antenna_position_m) if config.gnss else np.zeros(3)
+        rig = Rig(imus, antenna, sensors_of(config, document))
+    if config.odometer is not None and rig.has_wheels:
+        place = document.place(["odometer"])
+        raise InputError(f"{place}: is given, and an IMU on a wheel, which shows the speed as well; expected one")
+    return rig
 
 
 def in_force(config: Config, offsets: tuple[Offset, ...] = ()) -> str:
@@ -223,6 +232,7 @@ def _filter_options(config: Config) -> FilterOptions:
         gnss_snap=config.filter.gnss_snap_s,
         gravity=config.filter.gravity_m_s2,
         rolling=config.filter.rolling.options(),
+        nonholonomic=constraint_of(config),
     )
 
 
@@ -245,5 +255,6 @@ def _with_absolute_paths(config: Config, folder: Path, path: Path) -> Config:
         "imus": tuple(absolute(imu) for imu in config.imus),
         "gnss": absolute(config.gnss),
         "reference": absolute(config.reference),
+        **{kind: absolute(entry) for kind, entry in entries(config)},
     }
     return config.model_copy(update=changes)

@@ -15,7 +15,7 @@ from polyins.report.drift_curves import drift_figure
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
 from polyins.report.figure import Figure, as_script
 from polyins.report.imu_errors import imu_error_figure
-from polyins.report.innovations import innovation_figure
+from polyins.report.innovations import innovation_figure, other_kinds
 from polyins.report.outage_bars import outage_figure
 from polyins.report.scene import Scene
 from polyins.report.tables import facts, figures_table, warnings_by_text
@@ -45,6 +45,7 @@ SECTIONS: tuple[tuple[str, str, str, Callable[[Scene], Figure | None]], ...] = (
         innovation_figure,
     ),
 )
+INNOVATIONS = "Predicted minus measured, and three times the standard deviation that the filter expected."
 OVER_TIME = ("position", "velocity", "attitude", "imus", "innovations")
 WIDE = ("imus",)
 """figures that scroll sideways on a narrow screen"""
@@ -81,13 +82,16 @@ def write_report(
 
 
 def _sections(scene: Scene) -> list[dict[str, Any]]:
-    drawn = ((name, title, caption, draw(scene)) for name, title, caption, draw in SECTIONS)
+    drawn = [(name, title, caption, draw(scene)) for name, title, caption, draw in SECTIONS]
+    for kind in other_kinds(scene):
+        figure = innovation_figure(scene, kind)
+        drawn.append((f"innovations-{kind.replace(' ', '-')}", f"Innovations of {kind}", INNOVATIONS, figure))
     shaded = _what_is_shaded(scene)
     return [
         {
             "id": name,
             "title": title,
-            "caption": f"{caption} {shaded}" if name in OVER_TIME else caption,
+            "caption": f"{caption} {shaded}" if name in OVER_TIME or caption is INNOVATIONS else caption,
             "height": figure.layout["height"],
             "plot": ", ".join(as_script(part) for part in (figure.data, figure.layout, SETTINGS)),
             "wide": name in WIDE,

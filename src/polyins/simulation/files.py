@@ -15,12 +15,17 @@ from numpy.typing import NDArray
 from polyins.config.yaml_document import write_yaml
 from polyins.files import whole, write_bytes
 from polyins.formats.table import ATTITUDE_NAMES, GEODETIC_NAMES, LOCAL_NAMES, VELOCITY_NAMES, write_gnss, write_imu
-from polyins.model.recording import FilterOptions, Recording, Reference, RollingOptions, StartOptions
-from polyins.model.rig import DEG, HOUR, MGAL, PPM, Imu, ImuErrors, NoiseGrade, Wheel
+from polyins.model.recording import AidingStream, FilterOptions, Recording, Reference, RollingOptions, StartOptions
+from polyins.model.rig import DEG, HOUR, MGAL, PPM, AidingSensor, Imu, ImuErrors, NoiseGrade, Wheel
 
 Array = NDArray[np.float64]
 
 CONFIG = "recording.yaml"
+
+
+_VALUES = {"height": "height_m", "heading": "heading_deg", "odometer": "speed_m_s"}
+_OFFSETS = {"height": "bias_std_m", "heading": "offset_std_deg", "odometer": "scale_std"}
+_UNITS = {"height": 1.0, "heading": DEG, "odometer": 1.0}
 
 
 def write(recording: Recording, folder: str | Path) -> Path:
@@ -35,6 +40,19 @@ def write(recording: Recording, folder: str | Path) -> Path:
     if recording.reference is not None:
         config["reference"] = {"file": "reference.parquet", "point_m": recording.reference.lever_arm.tolist()}
         write_reference(place / "reference.parquet", recording.reference, geodetic=recording.geodetic)
+    for shown in recording.aiding:
+        config[shown.kind] = _sensor(recording.rig.sensor(shown.kind), shown)
+        write_sensor(place / f"{shown.kind}.parquet", shown)
+    if recording.options.nonholonomic is not None:
+        assumed = recording.options.nonholonomic
+        right, down = assumed.std.tolist()
+        config["odometer"] = {
+            "position_m": recording.rig.sensor("odometer").position.tolist(),
+            **config.get("odometer", {}),
+            "constraint_interval_s": assumed.interval,
+            "right_std_m_s": right,
+            "down_std_m_s": down,
+        }
     config["start"] = _start(recording.start, recording.geodetic)
     config["outages"] = [list(outage) for outage in recording.outages]
     config["filter"] = _filter(recording.options)
@@ -42,6 +60,16 @@ def write(recording: Recording, folder: str | Path) -> Path:
         config["filter"]["rolling"] = _rolling(recording.options.rolling)
     write_bytes(place / CONFIG, write_yaml(config).encode())
     return place / CONFIG
+
+
+def write_sensor(path: str | Path, stream: AidingStream) -> None:
+    """Write what a sensor shows, and its std, as Parquet."""
+    from pyarrow import parquet, table
+
+    unit = _UNITS[stream.kind]
+    columns = {"time_s": stream.time, _VALUES[stream.kind]: stream.value / unit, "std": stream.std[:, 0] / unit}
+    with whole(path) as beside:
+        parquet.write_table(table(columns), beside)
 
 
 def write_reference(path: str | Path, reference: Reference, *, geodetic: bool) -> None:
@@ -147,9 +175,25 @@ def _start(start: StartOptions, geodetic: bool) -> dict[str, Any]:
     return entry | {"heading_from": start.heading_from, "estimate_gyro_bias": start.estimate_gyro_bias}
 
 
+def _sensor(sensor: AidingSensor, stream: AidingStream) -> dict[str, Any]:
+    """Return the section of a sensor; right and down of an odometer are as sure at every time."""
+    kind = sensor.kind
+    entry: dict[str, Any] = {
+        "file": f"{kind}.parquet",
+        "columns": {"time": {"name": "time_s"}, "value": _VALUES[kind], "std": "std"},
+        "position_m": sensor.position.tolist(),
+        _OFFSETS[kind]: sensor.offset_std / _UNITS[kind],
+    }
+    if kind == "height":
+        entry["bias_random_walk_m_sqrt_s"] = sensor.offset_random_walk
+    if kind == "odometer":
+        entry["right_std_m_s"], entry["down_std_m_s"] = stream.std[0, 1:].tolist()
+    return entry
+
+
 def _filter(options: FilterOptions) -> dict[str, Any]:
     units = {"gnss_snap": "gnss_snap_s", "gravity": "gravity_m_s2"}
-    names = [item.name for item in fields(options) if item.name != "rolling"]
+    names = [item.name for item in fields(options) if item.name not in ("rolling", "nonholonomic")]
     return {units.get(name, name): getattr(options, name) for name in names}
 
 

@@ -26,7 +26,7 @@ from polyins.formats.rows import ImuRows
 from polyins.formats.solution_files import SolutionWriter
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import ImuStream, Recording
-from polyins.model.solution import Innovations, Solution
+from polyins.model.solution import Solution
 from polyins.navigate import batch
 from polyins.navigate.batch import Prepared
 from polyins.navigate.choice import choose
@@ -286,12 +286,10 @@ def _whole(last: Solution, recording: LongRecording, filter_s: float, first_call
         gaps = [gap for gap in extent.gaps if gap[1] > begin and gap[0] < end]
         if gaps:
             warnings.append(timesync.gap_warning(imu.name, gaps))
-    fixes = last.innovations
-    used = fixes.time <= last.time[-1]
-    rows = {name: getattr(fixes, name)[used] for name in Innovations.__dataclass_fields__}
+    measured = {name: one.until(float(last.time[-1])) for name, one in last.measurements.items()}
     return replace(
         last,
-        innovations=Innovations(**rows),
+        measurements=measured,
         filter_s=filter_s,
         first_call_s=first_call_s,
         warnings=tuple(warnings),

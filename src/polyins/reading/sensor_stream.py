@@ -1,0 +1,129 @@
+"""Heights, headings and speeds as configured: tables read, checked, in SI, on the recording's clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from polyins.checks import stream_checks
+from polyins.config import Config, HeadingEntry, HeightEntry, OdometerEntry, SensorColumns, SensorEntry
+from polyins.config.yaml_document import Document
+from polyins.errors import InputError
+from polyins.files import find_named
+from polyins.formats.columns import read_columns
+from polyins.formats.table import SECONDS
+from polyins.model.recording import AidingStream, Array, NonholonomicOptions
+from polyins.model.rig import DEG, AidingSensor
+
+Span = tuple[float, float]
+
+UNITS = {
+    "height": {"m": 1.0},
+    "heading": {"deg": DEG, "rad": 1.0},
+    "odometer": {"m/s": 1.0, "km/h": 1.0 / 3.6},
+}
+"""SI per unit, of each kind; the usual unit first"""
+COLUMNS = {"height": "height_m", "heading": "heading_deg", "odometer": "speed_m_s"}
+"""of a table whose columns are not declared"""
+
+
+def entries(config: Config) -> Iterator[tuple[str, SensorEntry]]:
+    """Give the kind and section of each sensor that is configured."""
+    for kind in COLUMNS:
+        entry: SensorEntry | None = getattr(config, kind)
+        if entry is not None:
+            yield kind, entry
+
+
+def sensors_of(config: Config, document: Document) -> tuple[AidingSensor, ...]:
+    """Return the sensors as parts of the rig; raises InputError for one that is farther away than any rig is long."""
+    found = []
+    for kind, entry in entries(config):
+        std, walk = 0.0, 0.0
+        if isinstance(entry, HeightEntry):
+            std, walk = entry.bias_std_m, entry.bias_random_walk_m_sqrt_s
+        elif isinstance(entry, HeadingEntry):
+            std = entry.offset_std_deg * DEG
+        elif isinstance(entry, OdometerEntry):
+            std = entry.scale_std
+        with document.at([kind, "position_m"]):
+            found.append(AidingSensor(kind, np.array(entry.position_m), std, walk))
+    return tuple(found)
+
+
+def constraint_of(config: Config) -> NonholonomicOptions | None:
+    """Return how the filter is told that the vehicle does not slip, beside what the odometer says."""
+    entry = config.odometer
+    if entry is None or entry.constraint_interval_s is None:
+        return None
+    return NonholonomicOptions(entry.constraint_interval_s, np.array([entry.right_std_m_s, entry.down_std_m_s]))
+
+
+def read_sensors(config: Config, document: Document, span: Span) -> tuple[tuple[AidingStream, ...], list[str]]:
+    """Read all of them; returns streams and warnings. `span`: of the IMUs, s.
+
+    Raises InputError for data and settings that cannot be right.
+    """
+    streams, warnings = [], []
+    for kind, entry in entries(config):
+        if not entry.file and kind == "odometer" and constraint_of(config) is not None:
+            continue
+        stream, texts = _read(kind, entry, document, span)
+        streams.append(stream)
+        warnings += texts
+    return tuple(streams), warnings
+
+
+def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tuple[AidingStream, list[str]]:
+    with document.at([kind, "file"]):
+        find_named(entry.file)
+    columns, unit = _columns(kind, entry, document)
+    wanted = [columns.time.name, columns.value, *([] if columns.std is None else [columns.std])]
+    source, (stamps, value, *std) = read_columns(entry.file, wanted)
+    time = stamps * SECONDS[columns.time.unit] + entry.clock_offset_s
+    if not len(time):
+        raise InputError(f"{source.path}: no rows; expected those of {kind}")
+    stream_checks.check_finite(source, {"time": time, kind: value})
+    stream_checks.check_order(source, time)
+    warnings = stream_checks.check_within(source, kind, time, span)
+    given = _std(entry)
+    if given is None and not std:
+        place = document.place([kind])
+        raise InputError(f"{place}: {source.path} has no std; expected a column std or {_std_key(kind)}")
+    stds = std[0] * unit if given is None else np.full(len(time), given)
+    stream_checks.check_finite(source, {"std": stds})
+    for row in np.flatnonzero(stds <= 0.0)[:1]:
+        raise InputError(f"{source.place(int(row))}: std of {kind} is {stds[row]:g}; expected a number above zero")
+    return AidingStream(kind, time, value * unit, _spread(entry, stds)), list(warnings)
+
+
+def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorColumns, float]:
+    """Return the columns and SI per unit of the value."""
+    columns = entry.columns or SensorColumns.model_validate({"time": {"name": "time_s"}, "value": COLUMNS[kind]})
+    units = UNITS[kind]
+    unit: str = columns.unit or next(iter(units))
+    if unit not in units:
+        place = document.place([kind, "columns", "unit"])
+        raise InputError(f"{place}: is {unit} for {kind}; expected {' or '.join(units)}")
+    return columns, units[unit]
+
+
+def _std(entry: SensorEntry) -> float | None:
+    if isinstance(entry, HeadingEntry):
+        return None if entry.std_deg is None else entry.std_deg * DEG
+    if isinstance(entry, HeightEntry):
+        return entry.std_m
+    return entry.std_m_s if isinstance(entry, OdometerEntry) else None
+
+
+def _std_key(kind: str) -> str:
+    return {"height": "std_m", "heading": "std_deg", "odometer": "std_m_s"}[kind]
+
+
+def _spread(entry: SensorEntry, std: Array) -> Array:
+    """Return the std of all components that are measured: of an odometer also right and down."""
+    if not isinstance(entry, OdometerEntry):
+        return std[:, None]
+    others = np.broadcast_to([entry.right_std_m_s, entry.down_std_m_s], (len(std), 2))
+    return np.column_stack([std, others])
