@@ -18,6 +18,7 @@ from polyins.model.recording import USUAL_OF, ImuStream, Recording
 from polyins.model.solution import Solution
 from polyins.navigate import batch
 from polyins.navigate.navigator import Navigator
+from polyins.prepare.alignment import Start
 
 ARRAYS = ("single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization")
 WHEELS = ("wheel-ins", "body-ins", "triple-ins", "triple-ins/centralized")
@@ -188,3 +189,19 @@ def test_samples_of_another_number_of_imus_are_refused() -> None:
     navigator = Navigator(recording.rig, batch.prepare(recording, "enav-fusion").start)
     with pytest.raises(InputError, match="of 2 IMUs; expected those of 3"):
         navigator.imu(0.01, np.zeros((2, 3)), np.zeros((2, 3)))
+
+
+def test_a_vehicle_begins_at_a_start_that_is_known() -> None:
+    """Whose wheels stand at any angle: they are levelled."""
+    recording = drive()
+    rig = recording.rig
+    position = recording.start.position if recording.start.position is not None else np.zeros(3)
+    found = batch.prepare(recording, "triple-ins").start
+    known = Start.known(rig, 8.0, position, attitude=found.attitude)
+    navigator = Navigator(rig, known, method="triple-ins", geodetic=recording.geodetic, options=recording.options)
+    for event in events(recording):
+        feed(navigator, recording, event)
+    navigator.flush()
+    state, solution = navigator.state, batch.run(recording, "triple-ins")
+    assert state is not None
+    assert np.abs(state.position - solution.position[-1]).max() < 1.0

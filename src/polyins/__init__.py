@@ -19,15 +19,18 @@ from polyins.version import __version__ as __version__
 if TYPE_CHECKING:
     from polyins.errors import InputError as InputError
     from polyins.evaluation.summary import summarize as evaluate
+    from polyins.model.recording import AidingStream as AidingStream
     from polyins.model.recording import GnssStream as GnssStream
     from polyins.model.recording import ImuStream as ImuStream
     from polyins.model.recording import Recording as Recording
     from polyins.model.recording import StartOptions as StartOptions
+    from polyins.model.rig import AidingSensor as AidingSensor
     from polyins.model.rig import Imu as Imu
     from polyins.model.rig import NoiseGrade as NoiseGrade
     from polyins.model.rig import Rig as Rig
     from polyins.model.rig import Wheel as Wheel
     from polyins.model.solution import Solution as Solution
+    from polyins.navigate.batch import find_start as find_start
     from polyins.navigate.batch import run as run
     from polyins.navigate.navigator import Navigator as Navigator
     from polyins.prepare.alignment import Start as Start
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
     from polyins.tools.comparison import compare as compare
 
 _HOMES = {
+    "AidingSensor": "model.rig",
+    "AidingStream": "model.recording",
     "GnssStream": "model.recording",
     "Imu": "model.rig",
     "ImuStream": "model.recording",
@@ -52,6 +57,7 @@ _HOMES = {
     "compare": "tools.comparison",
     "datasets": "reading.datasets:",
     "evaluate": "evaluation.summary:summarize",
+    "find_start": "navigate.batch",
     "load": "reading.loading",
     "run": "navigate.batch",
     "simulate": "simulation.run",

@@ -25,12 +25,12 @@ RATE_HZ = 50.0
 GRAVITY = 9.8  # m/s^2
 
 
-def rehearse(recording: Recording, delay: float, begin: Callable[[Start], Navigator]) -> None:
+def rehearse(recording: Recording, method: str, delay: float, begin: Callable[[Start], Navigator]) -> None:
     """Navigate at rest with the rig of a recording, and throw away what comes out."""
     still = _at_rest(recording)
     with TemporaryDirectory() as folder:
         outlet = Outlet(ParquetLog(Path(folder) / "log.parquet", {}), RATE_HZ)
-        session = Session(Starter(replace(still, imus=(), gnss=None), delay, needs_fix=True), begin, [outlet])
+        session = Session(Starter(replace(still, imus=(), gnss=None), delay, True, method), begin, [outlet])
         for chunk in Replay(still).chunks():
             for epoch in chunk:
                 session.take(epoch)
@@ -46,5 +46,7 @@ def _at_rest(recording: Recording) -> Recording:
     fixes = np.arange(0.5, SECONDS)
     zeros, ones = np.zeros((len(fixes), 3)), np.ones((len(fixes), 3))
     gnss = GnssStream(fixes, zeros, ones, zeros, ones)
-    start = StartOptions(heading=0.0)
+    start = StartOptions(
+        position=np.zeros(3), velocity=np.zeros(3), roll_pitch=np.zeros(2), heading=0.0, estimate_gyro_bias=False
+    )
     return replace(recording, imus=imus, gnss=gnss, reference=None, start=start, outages=())

@@ -252,8 +252,8 @@ def _session(options: Options, config: Config, recording: Recording, method: str
         wait=options.wait,
     )
     with compilation_said():
-        rehearse(recording, latest, begin)
-    starter = Starter(replace(recording, imus=(), gnss=None), latest, needs_fix)
+        rehearse(recording, method, latest, begin)
+    starter = Starter(replace(recording, imus=(), gnss=None), latest, needs_fix, method)
     every = options.checkpoint_every or math.inf
     checkpoints = Checkpoints(options.out, every)
     session = Session(starter, begin, (), checkpoints)

@@ -84,16 +84,20 @@ class Session:
         if self.navigator is not None:
             self._feed(epoch)
         elif (found := self.starter.take(epoch)) is not None:
-            self.start, collected = found
-            self.navigator = self.begin(self.start)
-            self.fix_times.append(self.start.time)  # what the start knows, a fix would have said
-            for one in collected:
-                # earlier fixes are in the start
-                if one.time > self.start.time - (BEFORE_START if isinstance(one, ImuEpoch) else 0.0):
-                    self._feed(one)
+            self._begin(*found)
+
+    def _begin(self, start: Start, collected: list[Epoch]) -> None:
+        self.start, self.navigator = start, self.begin(start)
+        self.fix_times.append(start.time)  # what the start knows, a fix would have said
+        for one in collected:
+            # earlier fixes are in the start
+            if one.time > start.time - (BEFORE_START if isinstance(one, ImuEpoch) else 0.0):
+                self._feed(one)
 
     def finish(self) -> None:
         """Let the navigator take what still waits, and pass the last state on."""
+        if self.navigator is None and (found := self.starter.finish()) is not None:
+            self._begin(*found)
         if self.navigator is None:
             return
         self.navigator.flush()

@@ -10,8 +10,12 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch
+from polyins.model.methods import find_method
 from polyins.model.recording import GnssStream, ImuStream, Recording
-from polyins.prepare import alignment, timesync
+from polyins.navigate import batch
+from polyins.navigate.choice import choose
+from polyins.navigate.start import same
+from polyins.prepare import course, timesync
 from polyins.prepare.alignment import Start
 
 EVERY = 1.0
@@ -20,6 +24,8 @@ FIRST = 5.0
 """s of data before the first attempt: a standstill of three seconds has its chance, unless nothing is to be found"""
 KEPT = 120.0
 """s of data that are kept: the longest standstill that is looked at, and as long again to move off"""
+SETTLED = 3.0
+"""s of further data that leave a start as it is: then it is that of the whole recording"""
 CUT_EVERY = 10.0  # s
 
 
@@ -46,13 +52,17 @@ class _Rows:
 
 
 class Starter:
-    """Collects epochs until `alignment.find_start` finds a start in them."""
+    """Collects epochs until the search finds a start in them which further data do not change."""
 
-    def __init__(self, blank: Recording, delay: float, needs_fix: bool) -> None:
+    def __init__(self, blank: Recording, delay: float, needs_fix: bool, method: str = "enav-fusion") -> None:
         """`blank` says all but the streams; an epoch may be later than others by `delay`, s.
 
-        `needs_fix`: the position is to come from GNSS.
+        `needs_fix`: the position is to come from GNSS. `method`: by which a vehicle finds its heading.
         """
+        self.method = find_method(method)
+        self.taken = choose(self.method, blank.rig).all
+        self.found: tuple[float, Start] | None = None
+        """when the start was first found, s, and it"""
         self.blank = blank
         self.delay = delay
         self.needs_fix = needs_fix
@@ -82,7 +92,7 @@ class Starter:
         if epoch.time < self.attempt + self.delay:
             return None
         until, self.attempt = self.attempt, self.attempt + EVERY
-        start = self._found(until)
+        start = self._settled(until)
         if start is not None:
             return start, self._collected()
         if until % CUT_EVERY == 0.0:
@@ -90,22 +100,54 @@ class Starter:
                 rows.cut(until - KEPT)
         return None
 
+    def finish(self) -> tuple[Start, list[Epoch]] | None:
+        """Return the start that the data have, now that there are no more, and all that was collected."""
+        start = self._found(self.newest)
+        return None if start is None else (start, self._collected())
+
     def _first_attempt(self, begin: float) -> float:
         start = self.blank.start
-        given = (start.position, start.velocity, start.roll_pitch, start.heading)
-        complete = not start.estimate_gyro_bias and all(value is not None for value in given)
-        earliest = begin if complete else begin + FIRST - EVERY
+        earliest = begin if self._is_given() else begin + FIRST - EVERY
         if start.static_interval is not None:
             earliest = max(earliest, start.static_interval[1])
         return (earliest // EVERY + 1.0) * EVERY
 
+    def _settled(self, until: float) -> Start | None:
+        """Return the start if data up to `until` leave no doubt that it is that of all data to come."""
+        start = self._found(until)
+        if start is None or self._is_given():
+            return start
+        if self.found is None or not same(self.found[1], start):
+            self.found = until, start
+        if until - self.found[0] >= SETTLED:
+            return start
+        self.why = "further data may still change the start"
+        if start.sources.get("time") == "end of the standstill":
+            self.why = "the start is at the end of the standstill, or after a minute of it"
+        return None
+
     def _found(self, until: float) -> Start | None:
         try:
             recording = self._recording(until)
-            return alignment.find_start(recording, timesync.align(recording.imus))
+            taken = recording.subset(self.taken)
+            aligned = timesync.align(taken.imus, bridge=not taken.rig.has_wheels)
+            start = batch.start_of(self.method, taken, aligned)
+            self._check_decided(taken, start)
         except InputError as error:
-            self.why = str(error)
+            self.why, self.found = str(error), None
             return None
+        return start.among(self.blank.rig, self.taken)
+
+    def _check_decided(self, recording: Recording, start: Start) -> None:
+        if recording.rig.has_wheels and course.is_wanted(recording) and not course.is_decided(recording, start.time):
+            raise InputError(
+                f"heading: comes from {course.LENGTH:g} m of track, not driven yet; expected more, or start.heading_deg"
+            )
+
+    def _is_given(self) -> bool:
+        start = self.blank.start
+        given = (start.position, start.velocity, start.roll_pitch, start.heading)
+        return not start.estimate_gyro_bias and all(value is not None for value in given)
 
     def _recording(self, until: float) -> Recording:
         streams = []

@@ -23,7 +23,7 @@ from polyins.navigate.choice import Choice, choose
 from polyins.navigate.events import Events
 from polyins.navigate.layout import Bank
 from polyins.navigate.state import Inputs, Navigators, Outputs, Plan, State
-from polyins.prepare import rigid, timesync, wheels
+from polyins.prepare import alignment, rigid, timesync, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.timesync import Aligned
 
@@ -125,7 +125,7 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     choice = choose(row, recording.rig, imu)
     recording = recording.subset(choice.all)
     aligned = timesync.align(recording.imus, bridge=not recording.rig.has_wheels)
-    start = find_start(row, recording, aligned)
+    start = start_of(row, recording, aligned)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
     if len(aligned.time) < 2:
@@ -136,7 +136,14 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     return replace(prepared, full_matrices=dense.workspace(count) if dense_covariance else None)
 
 
-def find_start(row: Method, recording: Recording, aligned: Aligned) -> Start:
+def find_start(recording: Recording, method: str = "enav-fusion", *, imu: int = 0) -> Start:
+    """Find the start that `run` has, of the IMUs that the method takes; raise InputError where nothing gives it."""
+    row = find_method(method)
+    taken = recording.subset(choose(row, recording.rig, imu).all)
+    return start_of(row, taken, timesync.align(taken.imus, bridge=not taken.rig.has_wheels))
+
+
+def start_of(row: Method, recording: Recording, aligned: Aligned) -> Start:
     """Find the start of a method over a recording whose IMUs are on one time base."""
     return search.find(recording, aligned, lambda blind: run(blind, row.name))
 
@@ -148,10 +155,11 @@ def lay_out(
 
     `end`: of the run, where `aligned` is but its beginning, s.
     """
+    interval = float(aligned.time[1] - aligned.time[0])
+    start = alignment.levelled(start, recording.rig, aligned.increments[0], interval)
     seats = layout.seat(row, choice, recording.rig, start)
     order = list(choice.blocks[0]) if row.bank == "mean" else seats.order
     first = aligned.increments[0][:, seats.order]
-    interval = float(aligned.time[1] - aligned.time[0])
     memory, navigators = layout.lay_out(row, choice, seats, recording, start, first, interval)
     navigators.plan.settings[places.LOG_EVERY] = max(1, round(aligned.rate_hz))
     inputs = inputs_of(choice, order, recording, aligned, start, end)

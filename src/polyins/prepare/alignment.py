@@ -97,6 +97,35 @@ class Start:
             imu_attitudes=attitudes,
         )
 
+    def among(self, rig: Rig, indices: list[int]) -> Start:
+        """Return the start, which is that of the IMUs of those indices, as one of all IMUs of a rig."""
+        errors = np.array([imu.initial_errors.as_array() for imu in rig.imus])
+        std = np.array([imu.start_std() for imu in rig.imus])
+        attitudes = None if self.imu_attitudes is None else np.zeros((len(rig.imus), 3))
+        errors[indices], std[indices] = self.imu_errors, self.imu_error_std
+        if attitudes is not None and self.imu_attitudes is not None:
+            attitudes[indices] = self.imu_attitudes
+        return replace(self, imu_errors=errors, imu_error_std=std, imu_attitudes=attitudes)
+
+
+def levelled(start: Start, rig: Rig, increments: Array, interval: float) -> Start:
+    """Return a start that says how each IMU of a rig with wheels lies; one that says it already is returned as it is.
+
+    The angle of a wheel is levelled from the increments that end at the start, (6, N) over `interval` s: what the
+    accelerometer feels, less what the spin adds at its place, is gravity.
+    """
+    if start.imu_attitudes is not None or not rig.has_wheels:
+        return start
+    axle = rotation_matrix(start.attitude)[:, 1]
+    attitudes = np.tile(start.attitude, (len(rig.imus), 1))
+    for i, imu in enumerate(rig.imus):
+        if imu.wheel is not None:
+            errors = start.imu_errors[i]
+            rate, force = np.split(increments[:, i] / interval - errors[:6], 2)
+            roll, pitch = level(force + np.cross(rate, np.cross(rate, imu.wheel.lever_arm)))
+            attitudes[i] = roll, pitch, np.arctan2(axle[1], axle[0])
+    return replace(start, imu_attitudes=attitudes)
+
 
 def find_start(recording: Recording, aligned: Aligned) -> Start:
     """Find the start of a recording whose IMUs are on one time base; raise InputError where nothing gives it."""
@@ -291,10 +320,14 @@ class _Search:
         """Return how far the heading turns from begin to end, from the gyros alone."""
         if end <= begin:
             return 0.0
-        bias = self._mean(*still)[0].mean(axis=0) if still else np.zeros(3)
+        # an IMU on a wheel turns with it
+        bodies = [i for i, imu in enumerate(self.recording.rig.imus) if imu.wheel is None]
+        if not bodies:
+            raise InputError("start: no heading: every IMU is on a wheel; expected start.heading_deg")
+        bias = self._mean(*still)[0][bodies].mean(axis=0) if still else np.zeros(3)
         part = self.aligned.between(begin, end)
-        known = bias + self.errors[:, :3].mean(axis=0)
-        steps = part.increments[1:, :3].mean(axis=2) - known * np.diff(part.time)[:, None]
+        known = bias + self.errors[bodies, :3].mean(axis=0)
+        steps = part.increments[1:, :3][:, :, bodies].mean(axis=2) - known * np.diff(part.time)[:, None]
         before = quaternions(np.array([[*roll_pitch, 0.0]]))
         after = in_succession(np.concatenate([before, of_rotation_vectors(steps)]))
         return float(euler_angles(after[None, :])[0, 2])

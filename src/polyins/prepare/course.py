@@ -53,6 +53,12 @@ def blind(recording: Recording) -> Recording:
     return replace(recording, gnss=None, outages=(), start=start)
 
 
+def is_decided(recording: Recording, begin: float) -> bool:
+    """Whether the fixes reach beyond the stretch that is compared: further ones do not change the heading."""
+    assert recording.gnss is not None
+    return _end(recording, recording.gnss, begin) is not None
+
+
 def find(recording: Recording, begin: float, navigate: Callable[[Recording], Track]) -> Course:
     """Dead-reckon with heading zero by `navigate` and fit the track to GNSS; raise InputError if it is too short.
 

@@ -186,7 +186,7 @@ def _lay_out(row: Method, recording: LongRecording) -> tuple[Prepared, float]:
             f"start: time {wanted:.3f} s; of a recording this long expected in its first {HEAD_S:g} s,"
             f" {first:.3f} to {aligned.time[-1]:.3f} s"
         )
-    start = alignment.find_start(head, aligned)
+    start = batch.start_of(row, head, aligned)
     end = last if head.start.end_time is None else min(last, head.start.end_time)
     return _light(
         batch.lay_out(row, choose(row, head.rig), head, aligned.between(start.time, np.inf), start, end=end)
