@@ -61,7 +61,7 @@ def test_the_script_is_heard(desk: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    clock, X
+    clock, ends = [1.7e9], 1.7e9 + 75.0
     received: list[str] = []
 
     def sleep(seconds: float) -> None:

@@ -69,9 +69,11 @@ def _yaw_rate(imu: Imu, stream: ImuStream, grid: Array, rest: NDArray[np.bool_])
 
 
 def _averaged(values: Array, stream: ImuStream) -> Array:
-    from scipy.ndimage import uniform_filter1d
-
-    return np.asarray(uniform_filter1d(values, max(1, round(AVERAGE_S * stream.rate_hz))))
+    """Return the moving average, the ends mirrored."""
+    count = max(1, round(AVERAGE_S * stream.rate_hz))
+    before = count // 2
+    total = np.cumsum(np.pad(values, (before + 1, count - 1 - before), mode="symmetric"))
+    return np.asarray((total[count:] - total[:-count]) / count)
 
 
 def _rms(values: Array) -> float:

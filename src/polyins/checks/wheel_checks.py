@@ -263,15 +263,15 @@ def _check_clocks(wheels: list[_Wheel], document: Document) -> list[str]:
 
 def _lag(a: _Wheel, b: _Wheel) -> float:
     """Return by how much b is later than a, s, by how both speed up and slow down; 0 if not by much."""
-    from scipy.signal import correlate, correlation_lags
-
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     grid = np.arange(begin, end, CLOCK_STEP_S)
     far = round(CLOCK_AVERAGE_S / CLOCK_STEP_S)
     ways = [np.interp(grid, wheel.time, wheel.way) for wheel in (a, b)]
     one, two = (way[2 * far :] - 2.0 * way[far:-far] + way[: -2 * far] for way in ways)
-    likeness = correlate(two, one, method="fft") / max(float(np.linalg.norm(one) * np.linalg.norm(two)), 1e-12)
-    lags = correlation_lags(len(two), len(one)) * CLOCK_STEP_S
+    size = len(one) + len(two) - 1
+    product = np.fft.irfft(np.fft.rfft(two, size) * np.fft.rfft(one[::-1], size), size)
+    likeness = product / max(float(np.linalg.norm(one) * np.linalg.norm(two)), 1e-12)
+    lags = np.arange(1 - len(one), len(two)) * CLOCK_STEP_S
     near = np.abs(lags) <= LARGEST_LAG_S
     best = int(np.argmax(np.where(near, likeness, -1.0)))
     alike = likeness[best] > likeness[lags == 0.0][0] + LIKENESS
