@@ -36,7 +36,8 @@ GNSS_BEFORE = 10.0
 NOISE = 0.02
 """m, added to the aircraft's smooth positions"""
 METHODS = ("imu-fusion", "nav-fusion", "enav-fusion")
-RAW = "RAW_1111"
+LOG = "AIRDATA.csv"
+"""of the autopilot; in the folder of a flight whose data are as recorded"""
 
 Row = dict[str, str]
 
@@ -102,14 +103,14 @@ def flight(folder: Path, row: Row) -> Recording:
         # t_imuk = t_imu1 + lag_k
         imu["clock_offset_s"] = -1e-3 * float(row[f"lag_imu{number}_ms"]) if number > 1 else 0.0
     attitude_lag, position_lag = float(row["lag_gtatt_to_imu1_s"]), float(row["pos_minus_att_lag_s"])
-    raw = row["flight"] == RAW
+    raw = (place / LOG).is_file()
     if raw:
         # the log's clock against the sensors'
         attitude_lag -= float(row["log_minus_sample_time_s"])
     else:
         values["imu_defaults"]["rate_hz"] = 120
     columns = RAW_COLUMNS if raw else COLUMNS
-    file = str(place / ("AIRDATA.csv" if raw else "GT.csv"))
+    file = str(place / (LOG if raw else "GT.csv"))
     values["gnss"] |= {"file": file, "columns": columns, "clock_offset_s": attitude_lag + position_lag}
     values["reference"] |= {
         "file": file,
@@ -139,7 +140,7 @@ HEIGHT_OF_TAKEOFF = 23.0
 def fly(recording: Recording, row: Row) -> Iterator[Outage]:
     """Run all methods through each outage of one flight."""
     first, last = _span(recording)
-    every = 5.0 if row["flight"] == RAW else 3.0
+    every = 5.0 if recording.geodetic else 3.0  # the flights as recorded are long, and geodetic
     begins = np.arange(first + GNSS_BEFORE, last - LENGTHS[0] + 1e-6, every)
     for begin, generator in zip(begins, np.random.default_rng(1).spawn(len(begins)), strict=True):
         lengths = [length for length in LENGTHS if begin + length <= last + 1e-6]
