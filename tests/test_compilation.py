@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numba
 import pytest
 
@@ -51,3 +54,22 @@ def test_after_a_warm_up_nothing_is_left_to_compile() -> None:
         for method in ("wheel-ins", "dual-wheel-ins"):
             batch.prepare(vehicle, method).advance(1, 20)
         assert seconds() == 0.0
+
+
+WITHOUT_PARTS = """
+import numba.core.codegen
+del numba.core.codegen.JITCodeLibrary
+import numpy as np
+from polyins.kernels import jit, kalman
+assert jit.PARTS is None
+update = np.zeros(kalman.SIZE)
+update[kalman.S : kalman.S + 9 : 4] = 4.0
+update[kalman.RESIDUAL : kalman.RESIDUAL + 3] = 2.0
+kalman.invert(update)
+print(float(kalman.normalized_innovation_squared(update)))
+"""
+
+
+def test_where_numba_has_changed_its_public_interface_does() -> None:
+    done = subprocess.run([sys.executable, "-c", WITHOUT_PARTS], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "3.0", done.stderr[-2000:]

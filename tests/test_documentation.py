@@ -440,6 +440,7 @@ CONFIGURATION: dict[str, type[BaseModel]] = {
     "outages": config.OutageSchedule,
     "filter": config.Filter,
     "filter.rolling": config.Rolling,
+    "filter.standstill": config.Standstill,
 }
 SCENARIO: dict[str, type[BaseModel]] = {
     "the whole scenario": scenario.Scenario,

@@ -17,7 +17,7 @@ from polyins.config.columns import (
     VelocityColumns,
 )
 from polyins.config.fields import NotNegative, Number, Pair, PerAxis, Positive, PositiveSpread, Section, Spread, Triple
-from polyins.config.file import Config, Filter, parse, validated
+from polyins.config.file import Config, Filter, Standstill, parse, validated
 from polyins.config.imu import NOISE_GRADES, ImuEntry, ImuSettings, InitialErrors, InitialStd, Noise
 from polyins.config.positions import GeodeticPoint, GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling, SpinAxis, WheelEntry
@@ -60,6 +60,7 @@ __all__ = [
     "SensorEntry",
     "SpinAxis",
     "Spread",
+    "Standstill",
     "Start",
     "StartPosition",
     "StdColumns",

@@ -16,9 +16,27 @@ from polyins.config.sensors import HeadingEntry, HeightEntry, OdometerEntry
 from polyins.config.timing import Outages, Start
 from polyins.config.yaml_document import Document, Key
 from polyins.errors import InputError
-from polyins.model.recording import FilterOptions
+from polyins.model.recording import FilterOptions, StandstillOptions
+from polyins.model.rig import DEG
+
+REST = StandstillOptions()
 
 SomeSection = TypeVar("SomeSection", bound=Section)
+
+
+class Standstill(Section):
+    """Updates by zero velocity and zero rate where an array without wheels is found at rest."""
+
+    interval_s: Positive = REST.interval
+    """whether it rests is judged over this time, s; the longer, the rarer a false standstill"""
+    velocity_std_m_s: Positive = REST.velocity_std
+    """m/s; the larger, the less a standstill weighs"""
+    rate_std_deg_s: Positive = REST.rate_std / DEG
+    """of the mean rate, deg/s; above what an idling engine shakes"""
+
+    def options(self) -> StandstillOptions:
+        """Return the same as the filter takes it."""
+        return StandstillOptions(self.interval_s, self.velocity_std_m_s, self.rate_std_deg_s * DEG)
 
 
 class Filter(Section):
@@ -34,6 +52,8 @@ class Filter(Section):
     """on a local tangent plane only, m/s^2"""
     rolling: Rolling = Rolling()
     """how wheels aid the filter"""
+    standstill: Standstill | None = None
+    """updates at rest, of an array without wheels; null: none"""
 
 
 class Config(Section):

@@ -1,25 +1,17 @@
-"""How kernels are compiled: entries, which Python calls, and the parts of which they are made; one cache folder.
-
-Numba would translate every function on its way into an entry, with all that it calls, and wrap it for Python and for C:
-twice the time of what is done here, where only entries are translated.
-"""
+"""How kernels are compiled: entries, which Python calls, and the parts of which they are made; one cache folder."""
 
 from __future__ import annotations
 
 import hashlib
-import importlib
 import os
 from collections.abc import Callable
-from contextlib import suppress
-from functools import cached_property
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy.typing as npt
 import platformdirs
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
 
 PACKAGE = Path(__file__).parents[1]
 COMPILED = (
@@ -50,25 +42,6 @@ Array = npt.NDArray[Any]
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _start_without_scipy() -> None:
-    """Keep Numba's start from importing scipy.linalg, which takes as long as importing NumPy.
-
-    It only asks whether BLAS is there; compiled functions that call BLAS import it themselves.
-    """
-    with suppress(ImportError, AttributeError):
-        from numba.np import linalg
-
-        ask = linalg.ensure_blas
-        linalg.ensure_blas = lambda *_, **__: None
-        try:
-            importlib.import_module("numba.np.arraymath")
-        finally:
-            linalg.ensure_blas = ask
-
-
-_start_without_scipy()
-
-
 def _compiled(function: F, **options: Any) -> F:
     before = NUMBA.CACHE_DIR
     NUMBA.CACHE_DIR = str(CACHE_FOLDER)
@@ -78,76 +51,26 @@ def _compiled(function: F, **options: Any) -> F:
         NUMBA.CACHE_DIR = before
 
 
-class _PartLibrary(JITCodeLibrary):
-    """Code that waits to be linked into that of an entry; there is no machine code of it."""
+def _parts() -> Any:
+    """Return what compiles parts faster, or None where Numba is another than it was made for."""
+    try:
+        from polyins.kernels import parts
 
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
-        self._finalized = True
-
-    @property
-    def codegen(self) -> Any:
-        return self
-
-    def set_env(self, name: str, env: Any) -> None:
-        """Do nothing, since there is no machine code that could know of an environment."""
+        parts.start_without_scipy()
+    except (ImportError, AttributeError, TypeError):
+        return None
+    return parts
 
 
-class _ScalarPartLibrary(_PartLibrary):
-    """Code that is optimised where it is linked into, and nowhere before."""
-
-    def _optimize_final_module(self) -> None:
-        pass
+PARTS: Final = _parts()
 
 
-class _PartCompiler(Compiler):
-    library = _PartLibrary
-
-    def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
-        own = self.library(target_context.codegen(), "part")  # type: ignore[no-untyped-call]
-        super().__init__(typing_context, target_context, own, *rest)  # type: ignore[no-untyped-call]
-
-
-class _ScalarPartCompiler(_PartCompiler):
-    library = _ScalarPartLibrary
-
-
-class _ScalarPartType(numba.types.Dispatcher):
-    """Numbers that are known beforehand, such as offsets, do not make a variant each."""
-
-    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        unknown = tuple(numba.types.unliteral(arg) for arg in args)  # type: ignore[no-untyped-call]
-        return super().get_call_type(context, unknown, kws)
-
-
-numba.extending.register_model(_ScalarPartType)(numba.core.datamodel.models.OpaqueModel)
-
-
-class _Part:
-    """A kernel that other kernels call: compiled with them. A call from Python compiles it by itself."""
-
-    def __init__(self, function: Callable[..., Any], compiler: type, kind: type, **options: Any) -> None:
-        self.py_func = function
-        self._options = options
-        self._dispatcher = _compiled(
-            function, pipeline_class=compiler, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
-        )
-        self._numba_type_ = kind(self._dispatcher)
-
-    @cached_property
-    def _alone(self) -> Callable[..., Any]:
-        return _entry(self.py_func, **self._options)
-
-    def __call__(self, *arguments: Any) -> Any:
-        return self._alone(*arguments)
-
-
-def _part(function: F, compiler: type = _PartCompiler, kind: type = numba.types.Dispatcher, **options: Any) -> F:
-    return function if NUMBA.DISABLE_JIT else cast(F, _Part(function, compiler, kind, **options))
-
-
-def _entry(function: F, **options: Any) -> F:
-    return _compiled(function, cache=True, no_cfunc_wrapper=True, **options)
+def _part(function: F, *, scalar: bool = False, runtime: bool = False) -> F:
+    if NUMBA.DISABLE_JIT:
+        return function
+    if PARTS is None:
+        return _compiled(function)
+    return cast(F, PARTS.Part(function, partial(_compiled, _nrt=runtime), scalar))
 
 
 def entry(function: F) -> F:
@@ -155,7 +78,9 @@ def entry(function: F) -> F:
 
     Without Numba's runtime: nothing can allocate, and no view of an array costs an atomic count of references.
     """
-    return _entry(function, _nrt=False)
+    if PARTS is None:
+        return _compiled(function, cache=True)
+    return _compiled(function, cache=True, no_cfunc_wrapper=True, _nrt=False)
 
 
 def compiled_for(function: F, *arguments: Any) -> F:
@@ -170,19 +95,19 @@ def compiled_for(function: F, *arguments: Any) -> F:
 
 def kernel(function: F) -> F:
     """Make a function of arrays and numbers a part of entries, optimised by itself first: so its loops vectorize."""
-    return _part(function, _nrt=False)
+    return _part(function)
 
 
 def scalar_kernel(function: F) -> F:
     """Make a function without such loops a part of entries: half the time to compile."""
-    return _part(function, _ScalarPartCompiler, _ScalarPartType, _nrt=False)
+    return _part(function, scalar=True)
 
 
 def blas_kernel(function: F) -> F:
     """Make a function that calls BLAS a part of entries, which Numba does only with its runtime."""
-    return _part(function, _nrt=True)
+    return _part(function, runtime=True)
 
 
 def formula(function: F) -> F:
     """Compile a formula that is inlined into each loop that uses it, so that the loop vectorizes."""
-    return _compiled(function, inline="always", _nrt=False)
+    return _compiled(function, inline="always") if PARTS is None else _compiled(function, inline="always", _nrt=False)

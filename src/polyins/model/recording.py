@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.model.rig import Rig, Vector, zero_vector
+from polyins.model.rig import DEG, Rig, Vector, zero_vector
 
 Array = NDArray[np.float64]
 
@@ -155,6 +155,18 @@ class NonholonomicOptions:
 
 
 @dataclass(frozen=True)
+class StandstillOptions:
+    """Updates by zero velocity and zero rate where an array without wheels is found at rest."""
+
+    interval: float = 1.0
+    """s: whether it rests is judged over this time, again and again; the longer, the rarer a false standstill"""
+    velocity_std: float = 0.01
+    """m/s; the larger, the less a standstill weighs"""
+    rate_std: float = 0.05 * DEG
+    """rad/s, of the mean rate; above what an idling engine shakes"""
+
+
+@dataclass(frozen=True)
 class FilterOptions:
     """What the filter is told beyond the rig."""
 
@@ -171,6 +183,8 @@ class FilterOptions:
     rolling: RollingOptions = RollingOptions()
     nonholonomic: NonholonomicOptions | None = None
     """None: it is not assumed"""
+    standstill: StandstillOptions | None = None
+    """of a rig without wheels, whose `rolling.standstill` says it otherwise; None: standstills are not looked for"""
 
 
 @dataclass(frozen=True)

@@ -104,8 +104,9 @@ def scheduled(due: Scheduled, time: Array, options: FilterOptions, rig: Rig) -> 
     epochs = np.array([epoch for epoch, _, _ in due], dtype=np.intp)
     kind = np.array([kind for _, kind, _ in due], dtype=np.int8)
     std = np.ones((len(due), 3))
-    std[kind == kinds.ZERO_VELOCITY] = ZERO_VELOCITY_STD
-    std[kind == kinds.ZERO_RATE] = ZERO_RATE_STD
+    rest = options.standstill
+    std[kind == kinds.ZERO_VELOCITY] = ZERO_VELOCITY_STD if rest is None else rest.velocity_std
+    std[kind == kinds.ZERO_RATE] = ZERO_RATE_STD if rest is None else rest.rate_std
     std[kind == kinds.REFERENCE_POINT] = options.rolling.constraint_std
     values = np.zeros((len(due), 6))
     values[:, 0] = [value for _, _, value in due]

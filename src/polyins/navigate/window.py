@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 from polyins.aiding import wheel_speed
-from polyins.kernels import bank, vehicle
+from polyins.kernels import bank, covariance, vehicle
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import scalar_kernel
+from polyins.model.states import place
 from polyins.navigate.state import (
+    RADIUS,
     STILL_RATE,
+    STRIDE,
     WINDOW_BEGIN,
     WINDOW_FILLED,
     WINDOW_LATERAL,
@@ -19,6 +24,12 @@ from polyins.navigate.state import (
 
 STILL_SPEED = 0.01
 """m/s"""
+SURE_SPEED = 0.25
+"""m/s: where the filter is less sure of its velocity it cannot tell rest from a smooth drive"""
+SLOW_SPEED = 0.1
+"""m/s, and twice its standard deviation: faster than this is no rest"""
+
+VELOCITY = place("velocity")
 
 
 @scalar_kernel
@@ -53,9 +64,27 @@ def fill(state: State, plan: Plan, inputs: Inputs, k: int, fraction: float, dt: 
 
 
 @scalar_kernel
+def _hardly_moves(state: State, plan: Plan) -> bool:
+    last, block = state.blocks[-1], state.blocks[0]
+    stride = int(plan.settings[STRIDE])
+    speed = variance = 0.0
+    for k in range(3):
+        speed += last[covariance.VELOCITY + k] ** 2
+        variance = max(variance, covariance.variance(block, VELOCITY + k, stride))
+    std = math.sqrt(variance)
+    hardly: bool = std < SURE_SPEED and math.sqrt(speed) < SLOW_SPEED + 2.0 * std
+    return hardly
+
+
+@scalar_kernel
 def holds_rest(state: State, plan: Plan, duration: float) -> bool:
-    """Whether no wheel has rolled and no IMU that measures has turned during the window."""
+    """Whether no wheel has rolled and no IMU that measures has turned during the window.
+
+    Without wheels the filter itself has to know that it hardly moves: what the IMUs feel in a smooth drive is the same.
+    """
     if not abs(state.scalars[WINDOW_TRAVEL]) < STILL_SPEED * duration:
+        return False
+    if plan.settings[RADIUS] == 0.0 and not _hardly_moves(state, plan):
         return False
     limit = plan.settings[STILL_RATE] * duration
     for s in range(plan.spans.shape[0]):

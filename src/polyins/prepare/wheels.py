@@ -59,10 +59,14 @@ class Schedule:
         """`start`: s; `wheels`: whether some give the speed; `several`: whether there are several blocks to compare."""
         self._options = options.rolling
         self._assumed = options.nonholonomic
+        self._rest = None if wheels else options.standstill
         self._wheels = wheels
         self._several = several
         self._last_speed = self._last_point = self._last_assumed = start
         self._open = False
+        if self._rest is not None:
+            # the first window begins at once, as long as it is known that a start is one at rest
+            self._last_speed = start - self._rest.interval
 
     @property
     def memory(self) -> tuple[float, float, float, bool]:
@@ -80,6 +84,8 @@ class Schedule:
         found = self._speeds(time, reach, lateral) if self._wheels else []
         if self._several:
             found += self._points(time, reach)
+        if self._rest is not None:
+            found += self._rests(time, reach, self._rest.interval)
         if self._assumed is not None:
             found += self._no_slips(time, reach, self._assumed.interval)
         return sorted(found, key=lambda event: event[0])
@@ -116,4 +122,14 @@ class Schedule:
         while (k := int(np.searchsorted(reach, self._last_assumed + interval))) < len(time):
             found.append((k, kinds.ODOMETER, 0.0))
             self._last_assumed = float(time[k])
+        return found
+
+    def _rests(self, time: Array, reach: Array, interval: float) -> Scheduled:
+        """Judge one window after the other; each begins where the one before ends."""
+        found: Scheduled = []
+        while (k := int(np.searchsorted(reach, self._last_speed + interval))) < len(time):
+            if self._open:
+                found += [(k, kinds.ZERO_RATE, 0.0), (k, kinds.ZERO_VELOCITY, 0.0)]
+            found.append((k, kinds.WINDOW, 0.0))
+            self._last_speed, self._open = float(time[k]), True
         return found

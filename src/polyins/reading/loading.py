@@ -233,6 +233,7 @@ def _filter_options(config: Config) -> FilterOptions:
         gravity=config.filter.gravity_m_s2,
         rolling=config.filter.rolling.options(),
         nonholonomic=constraint_of(config),
+        standstill=None if config.filter.standstill is None else config.filter.standstill.options(),
     )
 
 

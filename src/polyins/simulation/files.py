@@ -193,8 +193,14 @@ def _sensor(sensor: AidingSensor, stream: AidingStream) -> dict[str, Any]:
 
 def _filter(options: FilterOptions) -> dict[str, Any]:
     units = {"gnss_snap": "gnss_snap_s", "gravity": "gravity_m_s2"}
-    names = [item.name for item in fields(options) if item.name not in ("rolling", "nonholonomic")]
-    return {units.get(name, name): getattr(options, name) for name in names}
+    names = [item.name for item in fields(options) if item.name not in ("rolling", "nonholonomic", "standstill")]
+    rest = options.standstill
+    standstill = rest and {
+        "interval_s": rest.interval,
+        "velocity_std_m_s": rest.velocity_std,
+        "rate_std_deg_s": rest.rate_std / DEG,
+    }
+    return {units.get(name, name): getattr(options, name) for name in names} | {"standstill": standstill}
 
 
 def _rolling(options: RollingOptions) -> dict[str, Any]:
