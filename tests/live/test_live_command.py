@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,11 @@ from polyins import cli
 from polyins.errors import InputError
 from polyins.formats.solution_files import read_solution
 from polyins.live.run import Options, run
-from polyins.model.recording import Recording
+from polyins.model.recording import AidingStream, Recording
+from polyins.model.rig import AidingSensor
 from polyins.navigate import batch
+from polyins.reading import loading
+from polyins.simulation import files
 
 FAR = 30.0  # s
 PROGRAM = "import conftest, polyins.cli; polyins.cli.main()"
@@ -74,6 +78,22 @@ def test_the_log_of_every_epoch_is_that_of_a_batch_run(recording: Recording, dri
     np.testing.assert_array_equal(live.velocity, whole.velocity)
     np.testing.assert_allclose(live.position, whole.position, rtol=1e-15, atol=0.0)  # they were degrees
     np.testing.assert_allclose(live.phi_covariance[:, [0, 3, 5]], whole.phi_covariance[:, [0, 3, 5]], rtol=1e-12)
+
+
+def test_a_replay_with_heights_is_the_batch_run(recording: Recording, tmp_path: Path) -> None:
+    assert recording.reference is not None
+    time = np.arange(0.5, 49.0, 0.37)
+    height = np.interp(time, recording.reference.time, recording.reference.position[:, 2]) + 2.0
+    stream = AidingStream("height", time, height, np.full((len(time), 1), 0.2))
+    rig = replace(recording.rig, sensors=(AidingSensor("height", offset_std=5.0),))
+    path = files.write(replace(recording, rig=rig, aiding=(stream,)), tmp_path / "heights")
+    out = tmp_path / "out"
+    run(Options(path, out, sinks=(), speed=float("inf"), rate_hz=50.0))
+    live, whole = read_solution(out), batch.run(loading.load(path), "enav-fusion")
+    assert json.loads((out / "summary.json").read_text())["epochs"]["height"] > 100
+    assert abs(whole.offsets["height_bias"].value[-1] - 2.0) < 0.5
+    np.testing.assert_array_equal(live.time, whole.time)
+    np.testing.assert_array_equal(live.velocity, whole.velocity)
 
 
 def test_standard_input_gives_what_the_replay_gives(

@@ -93,3 +93,34 @@ def test_no_bytes_do_more_than_be_refused(line):
     except RefusedError:
         return
     assert np.isfinite(epoch.time)
+
+
+@pytest.mark.parametrize(
+    ("line", "value", "std"),
+    [
+        (b"polyins1,height,3.5,412.25,0.5", 412.25, [0.5]),
+        (b"polyins1,heading,3.5,90.0,1.0", np.pi / 2.0, [np.pi / 180.0]),
+        (b"polyins1,odometer,3.5,2.5,0.05,0.1,0.0", 2.5, [0.05, 0.1, 0.0]),
+    ],
+)
+def test_sensors_come_in_their_units_and_go_back_to_the_bit(line, value, std):
+    epoch = lines.parse(line)
+    assert (epoch.time, epoch.value) == (3.5, pytest.approx(value, rel=1e-15))
+    np.testing.assert_allclose(epoch.std, std, rtol=1e-15)
+    again = lines.parse(lines.write(epoch).encode())
+    assert again[:2] == epoch[:2]
+    assert again.value == pytest.approx(epoch.value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("line", "kind"),
+    [
+        (b"polyins1,height,3.5,412.25", "malformed"),
+        (b"polyins1,heading,3.5,90.0,-1.0", "implausible"),
+        (b"polyins1,odometer,3.5,2.5,0.05,0.1", "malformed"),
+        (b"polyins1,odometer,3.5,nan,0.05,0.1,0.1", "non-finite"),
+    ],
+)
+def test_sensors_that_are_wrong_are_refused(line, kind):
+    with pytest.raises(RefusedError, match=kind):
+        lines.parse(line)

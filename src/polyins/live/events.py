@@ -41,7 +41,20 @@ class GnssEpoch(NamedTuple):
     """the height counts from the sea, not from the ellipsoid"""
 
 
-Epoch = ImuEpoch | GnssEpoch
+class SensorEpoch(NamedTuple):
+    """What a sensor of height, heading or speed shows."""
+
+    kind: str
+    """height, heading or odometer"""
+    time: float
+    """s, on the sensor's clock"""
+    value: float
+    """m, rad or m/s"""
+    std: Array
+    """of the value, shape (1,); of an odometer forward, right and down, m/s, shape (3,), where zero is not measured"""
+
+
+Epoch = ImuEpoch | GnssEpoch | SensorEpoch
 
 
 class RefusedError(Exception):

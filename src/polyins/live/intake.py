@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from polyins.config import Config
-from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError
+from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError, SensorEpoch
 from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG, Rig
+from polyins.reading import sensor_stream
 
 
 class Intake:
@@ -17,10 +18,13 @@ class Intake:
         self.rotations = {imu.name: _unless_identity(imu.rotation) for imu in rig.imus}
         self.offsets = {entry.name: entry.clock_offset_s for entry in config.imus}
         self.gnss = config.gnss
+        self.sensors = dict(sensor_stream.entries(config))
         self.geodetic = geodetic
 
     def taken(self, epoch: Epoch) -> Epoch:
         """Return the epoch as the navigator wants it; raises RefusedError with the kind of what is wrong."""
+        if isinstance(epoch, SensorEpoch):
+            return self._sensor(epoch)
         return self._imu(epoch) if isinstance(epoch, ImuEpoch) else self._fix(epoch)
 
     def _imu(self, epoch: ImuEpoch) -> ImuEpoch:
@@ -30,6 +34,16 @@ class Intake:
         if rotation is None:
             return epoch._replace(time=time)
         return ImuEpoch(epoch.imu, time, rotation @ epoch.dtheta, rotation @ epoch.dvel)
+
+    def _sensor(self, epoch: SensorEpoch) -> SensorEpoch:
+        entry = self.sensors.get(epoch.kind)
+        if entry is None:
+            raise RefusedError(f"{epoch.kind} without a section {epoch.kind}")
+        given = sensor_stream.std_of(entry)
+        std = epoch.std
+        if given is not None:
+            std = sensor_stream.with_constraint(entry, np.array([given]))[0]
+        return epoch._replace(time=epoch.time + entry.clock_offset_s, std=std)
 
     def _fix(self, fix: GnssEpoch) -> GnssEpoch:
         entry = self.gnss

@@ -4,6 +4,9 @@
     polyins1,increments,NAME,TIME,X,Y,Z,VX,VY,VZ                 s, rad, m/s
     polyins1,gnss,TIME,LATITUDE,LONGITUDE,HEIGHT,SN,SE,SD[,VN,VE,VD,SVN,SVE,SVD]       s, deg, m, m/s
     polyins1,plane,TIME,NORTH,EAST,HEIGHT,SN,SE,SD[,VN,VE,VD,SVN,SVE,SVD]              s, m, m/s
+    polyins1,height,TIME,HEIGHT,STD                              s, m
+    polyins1,heading,TIME,HEADING,STD                            s, deg
+    polyins1,odometer,TIME,SPEED,STD,RIGHT,DOWN                  s, m/s; of no slip the std, or 0
 
 Rates are means over the INTERVAL that ends at TIME, increments belong to the interval since the epoch before. IMU data
 are in the sensor's axes. A line may end in `*` and two hexadecimal digits: the exclusive or of the bytes before it.
@@ -12,13 +15,13 @@ are in the sensor's axes. A line may end in `*` and two hexadecimal digits: the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import reduce
+from functools import partial, reduce
 from math import isfinite
 from operator import xor
 
 import numpy as np
 
-from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError
+from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError, SensorEpoch
 from polyins.model.rig import DEG
 
 MAGIC = "polyins1"
@@ -51,6 +54,9 @@ def write(epoch: Epoch) -> str:
     """Return the line of an epoch, without its end; every digit that the numbers have is kept."""
     if isinstance(epoch, ImuEpoch):
         return _joined("increments", epoch.imu, epoch.time, *epoch.dtheta, *epoch.dvel)
+    if isinstance(epoch, SensorEpoch):
+        unit = DEG if epoch.kind == "heading" else 1.0
+        return _joined(epoch.kind, epoch.time, epoch.value / unit, *(epoch.std / unit))
     assert epoch.position_std is not None
     values = [*epoch.position_std]
     if epoch.velocity is not None and epoch.velocity_std is not None:
@@ -134,9 +140,19 @@ def _fix(time: float, position: Array, rest: list[float], geodetic: bool) -> Gns
     return GnssEpoch(time, position, std, velocity, velocity_std, geodetic)
 
 
+def _sensor(kind: str, count: int, unit: float, fields: list[str]) -> SensorEpoch:
+    time, value, *std = _numbers(fields, 2 + count)
+    if std[0] <= 0.0 or min(std) < 0.0 or max(std) > LARGEST_STD:
+        raise RefusedError("implausible")
+    return SensorEpoch(kind, time, value * unit, np.array(std) * unit)
+
+
 _PARSERS: dict[str, Callable[[list[str]], Epoch]] = {
     "increments": _increments,
     "rates": _rates,
     "gnss": _geodetic,
     "plane": _plane,
+    "height": partial(_sensor, "height", 1, 1.0),
+    "heading": partial(_sensor, "heading", 1, DEG),
+    "odometer": partial(_sensor, "odometer", 3, 1.0),
 }

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from polyins.live.events import Epoch, GnssEpoch, ImuEpoch
+from polyins.live.events import Epoch, GnssEpoch, ImuEpoch, SensorEpoch
 from polyins.live.source import POLL
 from polyins.model.recording import Recording
 
@@ -57,8 +57,9 @@ class Replay:
             self.stopped.wait(min(left, POLL))
 
     def _epochs(self) -> Iterator[Epoch]:
-        imus, gnss = self.recording.imus, self.recording.gnss
-        times = [stream.time for stream in imus] + ([] if gnss is None else [gnss.time])
+        imus, gnss, aiding = self.recording.imus, self.recording.gnss, self.recording.aiding
+        times = [stream.time for stream in imus] + [shown.time for shown in aiding]
+        times += [] if gnss is None else [gnss.time]
         stamps = np.concatenate(times)
         stream_of = np.repeat(np.arange(len(times)), [len(one) for one in times])
         row_of = np.concatenate([np.arange(len(one)) for one in times])
@@ -69,6 +70,9 @@ class Replay:
             if number < len(imus):
                 stream = imus[number]
                 yield ImuEpoch(stream.name, float(stamps[k]), stream.dtheta[row], stream.dvel[row])
+            elif number < len(imus) + len(aiding):
+                shown = aiding[number - len(imus)]
+                yield SensorEpoch(shown.kind, float(stamps[k]), float(shown.value[row]), shown.std[row])
             elif not self._withheld(float(stamps[k])):
                 yield self._fix(row)
 

@@ -194,7 +194,8 @@ class Live:
     def summary(self, method: str, warnings: Sequence[str]) -> dict[str, Any]:
         """Return the document that is written at the end."""
         session = self.session
-        names = [imu.name for imu in session.starter.blank.rig.imus]
+        rig = session.starter.blank.rig
+        names = [imu.name for imu in rig.imus] + [sensor.kind for sensor in rig.sensors]
         report = session.report()
         checkpoints = session.checkpoints.count if session.checkpoints else 0
         return {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polyins.files import write_bytes
-from polyins.live.events import Array, Epoch, ImuEpoch
+from polyins.live.events import Array, Epoch, ImuEpoch, SensorEpoch
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
 from polyins.live.starter import Starter
@@ -67,7 +67,7 @@ class Session:
         self.start: Start | None = None
         self.origin: Array | None = None
         self.epochs: Counter[str] = Counter()
-        """what the navigator took, by IMU, and fixes as GNSS"""
+        """what the navigator took, by IMU, fixes as GNSS, and by kind of sensor"""
         self.fix_times: deque[float] = deque(maxlen=6)
         self.due = float("-inf")
         """s: a state is looked at when a stamp has come that far"""
@@ -112,6 +112,8 @@ class Session:
         refused = sum(self.navigator.counts.values())
         if isinstance(epoch, ImuEpoch):
             self.navigator.imu(epoch.time, epoch.dtheta, epoch.dvel, self.index[epoch.imu])
+        elif isinstance(epoch, SensorEpoch):
+            self.navigator.aid(epoch.kind, epoch.time, epoch.value, epoch.std)
         else:
             assert epoch.position_std is not None
             self.navigator.gnss(epoch.time, epoch.position, epoch.position_std, epoch.velocity, epoch.velocity_std)
@@ -122,6 +124,8 @@ class Session:
     def _taken(self, epoch: Epoch) -> None:
         if isinstance(epoch, ImuEpoch):
             self.epochs[epoch.imu] += 1
+        elif isinstance(epoch, SensorEpoch):
+            self.epochs[epoch.kind] += 1
         else:
             self.epochs["GNSS"] += 1
             self.fix_times.append(epoch.time)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch
+from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, SensorEpoch
 from polyins.model.methods import find_method
 from polyins.model.recording import GnssStream, ImuStream, Recording
 from polyins.navigate import batch
@@ -71,12 +71,17 @@ class Starter:
         """why there is no start yet"""
         self.imus = {imu.name: _Rows(7) for imu in blank.rig.imus}
         self.fixes = _Rows(13)
+        self.shown: list[SensorEpoch] = []
+        """by sensors that say nothing of the start"""
         self.newest = float("-inf")
         self.attempt: float | None = None
         """s: data up to this time are looked at next"""
 
     def take(self, epoch: Epoch) -> tuple[Start, list[Epoch]] | None:
         """Take an epoch; returns the start, once it is found, and all that was collected in the order of stamps."""
+        if isinstance(epoch, SensorEpoch):
+            self.shown.append(epoch)
+            return None
         rows = self.imus[epoch.imu] if isinstance(epoch, ImuEpoch) else self.fixes
         if epoch.time in rows.stamps:
             self.counts["duplicated"] += 1
@@ -98,6 +103,7 @@ class Starter:
         if until % CUT_EVERY == 0.0:
             for rows in (*self.imus.values(), self.fixes):
                 rows.cut(until - KEPT)
+            self.shown = [epoch for epoch in self.shown if epoch.time >= until - KEPT]
         return None
 
     def finish(self) -> tuple[Start, list[Epoch]] | None:
@@ -170,7 +176,7 @@ class Starter:
         return GnssStream(rows[:, 0], rows[:, 1:4], rows[:, 4:7], *velocities)
 
     def _collected(self) -> list[Epoch]:
-        epochs: list[Epoch] = []
+        epochs: list[Epoch] = [*self.shown]
         for name, collected in self.imus.items():
             epochs += [ImuEpoch(name, float(row[0]), row[1:4], row[4:7]) for row in collected.sorted()]
         for row in self.fixes.sorted():
@@ -180,7 +186,7 @@ class Starter:
         return sorted(epochs, key=lambda epoch: epoch.time)
 
 
-def _row(epoch: Epoch) -> tuple[float, ...]:
+def _row(epoch: ImuEpoch | GnssEpoch) -> tuple[float, ...]:
     if isinstance(epoch, ImuEpoch):
         return epoch.time, *epoch.dtheta, *epoch.dvel
     assert epoch.position_std is not None

@@ -87,7 +87,7 @@ def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tupl
     stream_checks.check_finite(source, {"time": time, kind: value})
     stream_checks.check_order(source, time)
     warnings = stream_checks.check_within(source, kind, time, span)
-    given = _std(entry)
+    given = std_of(entry)
     if given is None and not std:
         place = document.place([kind])
         raise InputError(f"{place}: {source.path} has no std; expected a column std or {_std_key(kind)}")
@@ -95,7 +95,7 @@ def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tupl
     stream_checks.check_finite(source, {"std": stds})
     for row in np.flatnonzero(stds <= 0.0)[:1]:
         raise InputError(f"{source.place(int(row))}: std of {kind} is {stds[row]:g}; expected a number above zero")
-    return AidingStream(kind, time, value * unit, _spread(entry, stds)), list(warnings)
+    return AidingStream(kind, time, value * unit, with_constraint(entry, stds)), list(warnings)
 
 
 def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorColumns, float]:
@@ -109,7 +109,8 @@ def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorC
     return columns, units[unit]
 
 
-def _std(entry: SensorEntry) -> float | None:
+def std_of(entry: SensorEntry) -> float | None:
+    """Return the std of the value that takes the place of what a sensor says, SI."""
     if isinstance(entry, HeadingEntry):
         return None if entry.std_deg is None else entry.std_deg * DEG
     if isinstance(entry, HeightEntry):
@@ -121,7 +122,7 @@ def _std_key(kind: str) -> str:
     return {"height": "std_m", "heading": "std_deg", "odometer": "std_m_s"}[kind]
 
 
-def _spread(entry: SensorEntry, std: Array) -> Array:
+def with_constraint(entry: SensorEntry, std: Array) -> Array:
     """Return the std of all components that are measured: of an odometer also right and down."""
     if not isinstance(entry, OdometerEntry):
         return std[:, None]
