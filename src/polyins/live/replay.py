@@ -63,7 +63,9 @@ class Replay:
         stamps = np.concatenate(times)
         stream_of = np.repeat(np.arange(len(times)), [len(one) for one in times])
         row_of = np.concatenate([np.arange(len(one)) for one in times])
-        for k in np.lexsort([stream_of, stamps]):
+        # what is measured at an epoch is in the state of that epoch
+        due = stamps - np.where(stream_of < len(imus), 0.0, self.recording.options.gnss_snap)
+        for k in np.lexsort([stream_of, due]):
             if stamps[k] <= self.after:
                 continue
             number, row = stream_of[k], row_of[k]
