@@ -16,24 +16,25 @@ from typing import Any
 import numba
 import numpy as np
 
-from polyins.kernels import bank, earth, fuse, share, strapdown
+from polyins.kernels import bank, covariance, earth, fuse, strapdown
 
-W, G, NEAR = np.zeros(bank.SIZE), np.zeros(share.SIZE), np.zeros(5)
+LANES, BLOCK = np.zeros(bank.SIZE), np.zeros(covariance.P + covariance.STRIDE**2)
+WORK, SUMS, EARTH = np.zeros(covariance.WORK), np.zeros(fuse.SUMS), np.zeros(5)
 
 LOOPS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
-    "compensate": (strapdown.compensate, (W, 1.0, 0.01)),
-    "correct_coning_and_sculling": (strapdown.correct_coning_and_sculling, (W, 0.1)),
-    "rotate_at_own_state": (strapdown.rotate_at_own_state, (W,)),
-    "evaluate": (earth.evaluate, (W, 0.0, 0.0, 1.0)),
-    "advance": (strapdown.advance, (W, 0.01, NEAR)),
-    "project_to_origin": (fuse.project_to_origin, (W, 0.01)),
-    "add_to_means": (fuse.add_to_means, (W, G)),
-    "position_rows": (share._position_rows, (G, 0.01)),
-    "velocity_rows": (share._velocity_rows, (G,)),
-    "phi_rows": (share._phi_rows, (G,)),
-    "through_sensors": (share._through_sensors, (G,)),
-    "felt_by_rows": (share._felt_by_rows, (G,)),
-    "back_to_navigation": (share._back_to_navigation, (G,)),
+    "compensate": (strapdown.compensate, (LANES, 1.0, 0.01)),
+    "correct_coning_and_sculling": (strapdown.correct_coning_and_sculling, (LANES, 0.1)),
+    "rotate_at_own_state": (strapdown.rotate_at_own_state, (LANES,)),
+    "evaluate": (earth.evaluate, (LANES, 0.0, 0.0, 1.0)),
+    "advance": (strapdown.advance, (LANES, 0.01, EARTH)),
+    "project_to_point": (fuse.project_to_point, (LANES, 0.01)),
+    "add_to_means": (fuse.add_to_means, (LANES, SUMS)),
+    "position_rows": (covariance._position_rows, (BLOCK, WORK, 0.01)),
+    "velocity_rows": (covariance._velocity_rows, (BLOCK, WORK)),
+    "phi_rows": (covariance._phi_rows, (BLOCK, WORK)),
+    "through_sensors": (covariance._through_sensors, (BLOCK, WORK)),
+    "felt_by_rows": (covariance._felt_by_rows, (WORK,)),
+    "back_to_navigation": (covariance._back_to_navigation, (WORK,)),
 }
 
 VECTOR = re.compile(r"^\tv(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\w*)pd\t", re.MULTILINE)
