@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from array_recordings import NOISE
 
 from polyins.aiding import kinds
 from polyins.model import states
+from polyins.model.rig import AidingSensor, Imu, Rig
+from polyins.navigate.layout import states_of
 
 
 def test_every_kind_is_named_once() -> None:
@@ -18,11 +21,12 @@ def test_every_kind_is_named_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wanted", "mounting", "count"),
-    [(set(), False, 24), ({kinds.GNSS_POSITION}, True, 24), ({kinds.HEIGHT}, False, 25), ({kinds.HEADING}, True, 26)],
+    ("estimated", "count"),
+    [({}, 24), ({"odometer": 0.1}, 24), ({"height": 0.0}, 24), ({"height": 1.0}, 25), ({"heading": 0.1}, 26)],
 )
-def test_filters_have_the_states_that_their_measurements_ask_for(wanted: set[int], mounting: bool, count: int) -> None:
-    assert kinds.states_for(wanted, mounting) == count
+def test_filters_have_the_states_that_are_estimated(estimated: dict[str, float], count: int) -> None:
+    sensors = tuple(AidingSensor(kind, offset_std=std) for kind, std in estimated.items())
+    assert states_of(Rig((Imu("imu", NOISE),), sensors=sensors)) == count
 
 
 def test_states_stand_behind_each_other() -> None:

@@ -213,19 +213,19 @@ def error_model(block: Array, work: Array, dt: float, earth_reference: Array) ->
 Three = tuple[float, float, float]
 
 
-@scalar_kernel
+@formula
 def factors(work: Array, f: int) -> Three:
     """F dt in three columns of one row, from the place of the first on."""
     return work[f], work[f + HALF], work[f + 2 * HALF]
 
 
-@scalar_kernel
+@formula
 def column(array: Array, x: int, stride: int) -> Three:
     """Three numbers that stand `stride` apart."""
     return array[x], array[x + stride], array[x + 2 * stride]
 
 
-@scalar_kernel
+@formula
 def dot(a: Three, b: Three) -> float:
     """Multiply: A' b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -234,7 +234,7 @@ def dot(a: Three, b: Three) -> float:
 Row = tuple[float, float, Three, float, float]
 
 
-@scalar_kernel
+@formula
 def row(work: Array, i: int, k: int, m: int) -> Row:
     """Row i of F dt among the navigation states: no error depends on longitude, phi enters as a vector product."""
     return (
@@ -246,7 +246,7 @@ def row(work: Array, i: int, k: int, m: int) -> Row:
     )
 
 
-@scalar_kernel
+@formula
 def times(f: Row, r: Three, v: Three, p1: float, p2: float) -> float:
     """Multiply a row of F dt by a column of position, velocity and the two components of phi."""
     return (f[0] * r[0] + f[1] * r[2]) + dot(f[2], v) + (f[3] * p1 + f[4] * p2)

@@ -57,7 +57,7 @@ NO_INNOVATIONS = Innovations(
 
 
 @dataclass(frozen=True)
-class Offset:
+class OffsetEstimate:
     """What was estimated of the offset or scale of a sensor, one row per log entry."""
 
     value: Array
@@ -100,7 +100,7 @@ class Solution:
     """shape (K, N, 12)"""
     measurements: dict[str, Innovations] = field(default_factory=dict)
     """what became of the measurements, by the name of their kind, see `aiding.kinds`"""
-    offsets: dict[str, Offset] = field(default_factory=dict)
+    offsets: dict[str, OffsetEstimate] = field(default_factory=dict)
     """of height, heading and odometer, where the filter estimates them; times are `imu_error_time`"""
     mounting: Array | None = None
     """with wheels: estimated relative error of the wheel speed, and of a wheel's lever arm y and z (m) or of a body's

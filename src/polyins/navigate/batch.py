@@ -14,7 +14,7 @@ from polyins.errors import InputError
 from polyins.kernels import dense
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
-from polyins.model.solution import Innovations, Offset, Solution
+from polyins.model.solution import Innovations, OffsetEstimate, Solution
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.navigate import engine, events, layout, update
 from polyins.navigate import start as search
@@ -300,14 +300,14 @@ def innovations_of(run: Prepared) -> dict[str, Innovations]:
     return found
 
 
-def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, Offset]:
+def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, OffsetEstimate]:
     """Return what was estimated of the sensors' offsets and scales, by the state's name."""
     found = {}
     for sensor in run.recording.rig.sensors:
         if sensor.offset_std > 0.0:
             name = layout.offset_of(sensor)
             log = run.outputs.log[:, :, place(name) - NAVIGATION][:, :, lanes]
-            found[name] = Offset(log[:, 0].mean(axis=1), log[:, 1].mean(axis=1))
+            found[name] = OffsetEstimate(log[:, 0].mean(axis=1), log[:, 1].mean(axis=1))
     return found
 
 

@@ -103,7 +103,7 @@ def flight(folder: Path, row: Row) -> Recording:
         # t_imuk = t_imu1 + lag_k
         imu["clock_offset_s"] = -1e-3 * float(row[f"lag_imu{number}_ms"]) if number > 1 else 0.0
     attitude_lag, position_lag = float(row["lag_gtatt_to_imu1_s"]), float(row["pos_minus_att_lag_s"])
-    raw = (place / LOG).is_file()
+    raw = any(place.glob(f"{LOG}*"))
     if raw:
         # the log's clock against the sensors'
         attitude_lag -= float(row["log_minus_sample_time_s"])
