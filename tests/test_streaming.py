@@ -14,7 +14,8 @@ import polyins as pi
 from polyins.errors import InputError
 from polyins.evaluation.summary import summarize
 from polyins.formats.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
-from polyins.model.recording import ImuStream, Recording
+from polyins.model.recording import AidingStream, ImuStream, Recording, StandstillOptions
+from polyins.model.rig import AidingSensor
 from polyins.reading.loading import read_config
 from polyins.simulation import files
 from polyins.simulation.run import simulate
@@ -115,4 +116,25 @@ def test_only_large_parquet_recordings_are_taken_in_stretches(simulated, tmp_pat
     config = files.write(simulated, tmp_path / "recording")
     assert streaming.open_long(read_config(config)) is None
     config.write_text(config.read_text().replace("name: imu1\n", "name: imu1\n  gyro_range_deg_s: 2000\n", 1))
+    assert streaming.open_long(read_config(config), least_rows=0) is None
+
+
+def test_heights_are_measured_in_stretches_as_in_memory(simulated, tmp_path):
+    reference = simulated.reference
+    time = np.arange(0.5, 149.0, 0.37)
+    height = np.interp(time, reference.time, reference.position[:, 2]) + 2.0
+    stream = AidingStream("height", time, height, np.full((len(time), 1), 0.2))
+    rig = replace(simulated.rig, sensors=(AidingSensor("height", offset_std=5.0),))
+    config = files.write(replace(simulated, rig=rig, aiding=(stream,)), tmp_path / "recording")
+    document = streaming.run(opened(config), tmp_path / "long", stretch_s=20.0)
+    recording = pi.load(config)
+    solution = pi.run(recording)
+    assert document["measurements"]["height"]["count"] == solution.measurements["height"].time.size > 200
+    write_solution(solution, tmp_path / "whole")
+    same(tmp_path / "long", tmp_path / "whole")
+
+
+def test_what_is_measured_on_a_schedule_is_not_taken_in_stretches(simulated, tmp_path):
+    options = replace(simulated.options, standstill=StandstillOptions())
+    config = files.write(replace(simulated, options=options), tmp_path / "recording")
     assert streaming.open_long(read_config(config), least_rows=0) is None

@@ -135,15 +135,21 @@ def run(
 
 
 def _can_be_streamed(config: Config, document: Document) -> bool:
-    return not (config.gnss and config.gnss.time_offset) and all(
-        entry.wheel is None
-        and entry.time_offset is None
-        and entry.rate_hz is None
-        and entry.gyro_range_deg_s is None
-        and entry.format in ("auto", "table")
-        and (entry.columns is None or entry.columns.time is not None)
-        and _is_parquet(entry.file, document, index)
-        for index, entry in enumerate(config.imus)
+    # what is measured on a schedule is laid out for the beginning only
+    scheduled = config.filter.standstill or (config.odometer and config.odometer.constraint_interval_s)
+    return (
+        not scheduled
+        and not (config.gnss and config.gnss.time_offset)
+        and all(
+            entry.wheel is None
+            and entry.time_offset is None
+            and entry.rate_hz is None
+            and entry.gyro_range_deg_s is None
+            and entry.format in ("auto", "table")
+            and (entry.columns is None or entry.columns.time is not None)
+            and _is_parquet(entry.file, document, index)
+            for index, entry in enumerate(config.imus)
+        )
     )
 
 
