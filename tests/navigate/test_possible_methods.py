@@ -101,7 +101,7 @@ def test_joined_filters_of_an_array_are_as_sure_as_they_should_be() -> None:
     assert low < nees.mean() < high
 
 
-def test_joined_filters_of_an_array_are_surer_than_one() -> None:
+def test_joined_filters_of_an_array_accept_every_honest_fix() -> None:
     solution, _, variance = array_run(3)
     assert solution.measurements["GNSS position"].accepted.all()
     assert np.isfinite(solution.position).all()
