@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from synthetic_solutions import drive, innovations, moved, reference, solution
 
-from polyins.evaluation.consistency import consistency, mean_nis, nees, nees_bounds, position_nees, share_inside
+from polyins.evaluation.consistency import mean_nis, nees, nees_bounds, position_nees, share_inside
 from polyins.evaluation.errors import compare_to_reference
+from polyins.evaluation.summary import summarize
 from polyins.model.solution import NO_INNOVATIONS
 
 RUNS, INSTANTS, STATES = 40, 2000, 4
@@ -47,11 +48,11 @@ def test_position_nees_of_one_run_is_three_when_the_variances_are_right():
     errors = compare_to_reference(noisy, late)
     expected = np.sum((noise / std)[100:] ** 2, axis=1)
     np.testing.assert_allclose(position_nees(noisy, errors), expected, rtol=1e-5)
-    assert consistency(noisy, errors)["nees_position"] == pytest.approx(3.0, rel=0.05)
+    assert summarize(noisy, late)["consistency"]["nees_position"] == pytest.approx(3.0, rel=0.05)
 
 
 def test_rejected_fixes_do_not_count_in_the_mean_nis():
     shown = innovations(np.arange(3000.0), seed=2, rejected=(3, 700))
     assert mean_nis(shown) == pytest.approx(3.0, rel=0.05)
     assert mean_nis(NO_INNOVATIONS) is None
-    assert consistency(solution(drive()), None) == {"nees_position": None, "nis_gnss": None}
+    assert summarize(solution(drive()), None)["consistency"] == {"nees_position": None, "nis_gnss": None}

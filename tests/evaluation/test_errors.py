@@ -10,6 +10,7 @@ from synthetic_solutions import RADIUS_M, drive, moved, reference, solution
 
 from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
+from polyins.evaluation.summary import summarize
 from polyins.model.attitude import quaternions
 
 metres = st.floats(-50.0, 50.0)
@@ -22,7 +23,7 @@ def test_geodetic_position_error_in_metres(north, east, down):
     wrong = solution(truth, position=moved(truth.geodetic, np.array([north, east, down])))
     errors = compare_to_reference(wrong, reference(truth))
     np.testing.assert_allclose(errors.position, np.tile([north, east, down], (truth.time.size, 1)), atol=1e-6)
-    statistics = errors.statistics()
+    statistics = summarize(wrong, reference(truth))["reference"]
     assert statistics["horizontal_rms_m"] == pytest.approx(np.hypot(north, east), abs=1e-6)
     assert statistics["horizontal_max_m"] == pytest.approx(np.hypot(north, east), abs=1e-6)
     assert statistics["vertical_rms_m"] == pytest.approx(abs(down), abs=1e-6)
@@ -38,8 +39,7 @@ def test_local_position_error_has_down_positive_downwards():
 def test_attitude_errors_are_wrapped_where_heading_passes_180_degrees():
     truth = drive(duration=120.0)  # nearly two turns
     turned = truth.euler + np.radians([0.5, -0.25, 2.0])
-    errors = compare_to_reference(solution(truth, attitude=quaternions(turned)), reference(truth))
-    statistics = errors.statistics()
+    statistics = summarize(solution(truth, attitude=quaternions(turned)), reference(truth))["reference"]
     assert statistics["roll_rmse_deg"] == pytest.approx(0.5)
     assert statistics["pitch_rmse_deg"] == pytest.approx(0.25)
     assert statistics["heading_rmse_deg"] == pytest.approx(2.0)
@@ -85,8 +85,8 @@ def test_the_solution_is_moved_to_the_references_point(geodetic):
     errors = compare_to_reference(at_point, at_lever_arm)
     np.testing.assert_allclose(errors.position, 0.0, atol=2e-6)
     np.testing.assert_allclose(errors.velocity, 0.0, atol=1e-9)
-    unmoved = compare_to_reference(replace(at_point, point=lever_arm), at_lever_arm)
-    assert unmoved.statistics()["horizontal_rms_m"] > 1.0
+    unmoved = summarize(replace(at_point, point=lever_arm), at_lever_arm)
+    assert unmoved["reference"]["horizontal_rms_m"] > 1.0
 
 
 def test_epochs_beyond_the_reference_are_left_out_and_counted():
@@ -98,7 +98,7 @@ def test_epochs_beyond_the_reference_are_left_out_and_counted():
     assert errors.epochs_without_reference == truth.time.size - np.count_nonzero(within)
     assert errors.velocity is None
     assert errors.attitude is None
-    assert errors.statistics()["heading_rmse_deg"] is None
+    assert summarize(solution(truth), part)["reference"]["heading_rmse_deg"] is None
 
 
 @pytest.mark.parametrize(("missing", "bridged"), [(4, True), (5, False)])
@@ -113,9 +113,9 @@ def test_only_short_gaps_of_the_reference_are_bridged(missing, bridged):
 
 def test_a_reference_elsewhere_in_time_gives_no_figures():
     truth = drive()
-    errors = compare_to_reference(solution(truth), reference(truth, time=truth.time + 1e5))
-    assert errors.time.size == 0
-    assert set(errors.statistics().values()) == {None}
+    later = reference(truth, time=truth.time + 1e5)
+    assert compare_to_reference(solution(truth), later).time.size == 0
+    assert set(summarize(solution(truth), later)["reference"].values()) == {None}
 
 
 def test_distance_is_measured_along_the_reference():

@@ -47,11 +47,11 @@ def test_an_outage_without_errors_is_unknown_not_zero():
 def test_outages_that_the_errors_cover_in_part_are_named():
     time = np.concatenate([np.arange(0.0, 20.0, 0.1), np.arange(30.0, 50.0, 0.1)])
     errors = errors_of(time, np.ones_like(time))
-    assert partly_covered(errors, [(5.0, 10.0), (15.0, 25.0), (31.0, 40.0), (45.0, 60.0)]) == [
+    assert partly_covered(errors, [(5.0, 10.0), (15.0, 25.0), (31.0, 40.0), (45.0, 60.0)], 0.1) == [
         (15.0, 25.0),
         (45.0, 60.0),
     ]
-    assert partly_covered(errors_of(np.zeros(0), np.zeros(0)), [(0.0, 1.0)]) == [(0.0, 1.0)]
+    assert partly_covered(errors_of(np.zeros(0), np.zeros(0)), [(0.0, 1.0)], 0.1) == [(0.0, 1.0)]
 
 
 def test_published_curve_of_a_compensated_array_gives_the_published_figure(data_folder):

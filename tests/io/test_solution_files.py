@@ -9,7 +9,7 @@ import pytest
 from synthetic_solutions import drifting, drive, reference, solution
 
 from polyins.errors import InputError
-from polyins.evaluation.errors import compare_to_reference
+from polyins.evaluation.summary import summarize
 from polyins.files import whole
 from polyins.formats.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
 
@@ -94,7 +94,7 @@ def test_what_was_written_is_read_again(geodetic, tmp_path):
 def test_a_solution_read_again_is_judged_alike(drifted, tmp_path):
     write_solution(drifted, tmp_path)
     truth = reference(drive(), lever_arm=np.array([1.0, 0.5, -0.2]))
-    ours, theirs = (compare_to_reference(one, truth).statistics() for one in (drifted, read_solution(tmp_path)))
+    ours, theirs = (summarize(one, truth)["reference"] for one in (drifted, read_solution(tmp_path)))
     assert ours == pytest.approx(theirs, abs=1e-7)
 
 

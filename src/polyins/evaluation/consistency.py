@@ -49,11 +49,3 @@ def mean_nis(innovations: Innovations) -> float | None:
     """Return the mean normalized innovation squared of the accepted fixes; None without any."""
     accepted = innovations.nis[innovations.accepted]
     return float(np.mean(accepted)) if accepted.size else None
-
-
-def consistency(solution: Solution, errors: Errors | None) -> dict[str, float | None]:
-    """Return the `consistency` document: both figures are near 3 where the filter is consistent."""
-    of_position = None
-    if errors is not None and errors.time.size:
-        of_position = float(np.mean(position_nees(solution, errors)))
-    return {"nees_position": of_position, "nis_gnss": mean_nis(solution.innovations)}

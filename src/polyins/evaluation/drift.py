@@ -9,8 +9,11 @@ from polyins.evaluation.errors import Errors
 
 Array = NDArray[np.float64]
 
+STEP = 100.0
+"""m"""
 
-def drift(errors: Errors | None, step: float = 100.0) -> dict[str, float | None]:
+
+def drift(errors: Errors | None, step: float = STEP) -> dict[str, float | None]:
     """Return the `drift` document.
 
     For every multiple of `step` m travelled, the maximum horizontal error so far over that distance; `rate_percent` is
@@ -30,7 +33,7 @@ def drift(errors: Errors | None, step: float = 100.0) -> dict[str, float | None]
     return result
 
 
-def drift_rates(errors: Errors, step: float = 100.0) -> tuple[Array, Array]:
+def drift_rates(errors: Errors, step: float = STEP) -> tuple[Array, Array]:
     """Return the multiples of `step` travelled, m, and the drift rate at each, percent, shape (K,) both."""
     distance = float(errors.distance[-1]) if errors.distance.size else 0.0
     multiples = step * np.arange(1, int(distance / step) + 1, dtype=np.float64)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,15 +51,28 @@ class Errors:
         """How many epochs of the solution were left out."""
         return int(np.count_nonzero(~self.covered))
 
-    def statistics(self) -> dict[str, float | None]:
-        """Return the figures over all epochs; None where there is nothing to compute one from."""
-        attitude = [None] * 3 if self.attitude is None else list(np.degrees(self.attitude).T)
-        return {
-            "horizontal_rms_m": rms(self.horizontal),
-            "horizontal_max_m": float(np.max(self.horizontal)) if self.time.size else None,
-            "vertical_rms_m": rms(self.position[:, 2]),
-            **{f"{angle}_rmse_deg": rms(error) for angle, error in zip(ANGLES, attitude, strict=True)},
-        }
+    def at(self, rows: NDArray[np.intp]) -> Errors:
+        """Return those at some of the epochs, which count as a solution's only ones."""
+
+        def of(values: Array | None) -> Array | None:
+            return None if values is None else values[rows]
+
+        everywhere = np.ones(len(rows), dtype=bool)
+        velocity, attitude = of(self.velocity), of(self.attitude)
+        return Errors(self.time[rows], self.position[rows], velocity, attitude, self.distance[rows], everywhere)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Errors]) -> Errors:
+        """Return those of parts that follow one another."""
+
+        def whole(name: str) -> Any:
+            values = [getattr(part, name) for part in parts]
+            return None if any(value is None for value in values) else np.concatenate(values)
+
+        if not parts:
+            return cls(np.zeros(0), np.zeros((0, 3)), None, None, np.zeros(0), np.zeros(0, dtype=bool))
+        names = ("time", "position", "velocity", "attitude", "distance", "covered")
+        return cls(*(whole(name) for name in names))
 
 
 ANGLES = ("roll", "pitch", "heading")

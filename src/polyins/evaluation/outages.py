@@ -27,11 +27,14 @@ def outage_statistic(errors: Errors | None, outages: Sequence[Interval]) -> dict
     }
 
 
-def partly_covered(errors: Errors, outages: Sequence[Interval]) -> list[Interval]:
-    """Return the outages in part of which no error is known: their maxima may be too small."""
+def partly_covered(errors: Errors, outages: Sequence[Interval], interval: float) -> list[Interval]:
+    """Return the outages in part of which no error is known: their maxima may be too small.
+
+    `interval`: the usual one of the solution's epochs, s.
+    """
     if errors.time.size < 2:
         return list(outages)
-    longest = 5.0 * float(np.median(np.diff(errors.time)))
+    longest = 5.0 * interval
     return [outage for outage in outages if _longest_gap(errors.time, outage) > longest]
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.evaluation.consistency import consistency
+from polyins.evaluation.consistency import mean_nis
 from polyins.evaluation.drift import drift
-from polyins.evaluation.errors import Errors, compare_to_reference, rms
+from polyins.evaluation.errors import rms
+from polyins.evaluation.figures import Figures
 from polyins.evaluation.outages import Interval, outage_statistic, partly_covered
 from polyins.formats.documents import plain
 from polyins.model.methods import METHODS
@@ -30,77 +30,34 @@ NEGLIGIBLE_SHARE = 0.01
 NEGLIGIBLE_S = 1.0
 """A reference may lack less than this of the epochs, and less than this of the time, without a warning."""
 
-NO_FIGURES = dict.fromkeys(
-    ("horizontal_rms_m", "horizontal_max_m", "vertical_rms_m", "roll_rmse_deg", "pitch_rmse_deg", "heading_rmse_deg")
-)
-
 
 def summarize(solution: Solution, reference: Reference | None, outages: Sequence[Interval] = ()) -> Document:
     """Return the `run` document of one solution.
 
     Raises InputError if the reference cannot be compared with.
     """
-    errors = None if reference is None else compare_to_reference(solution, reference)
-    figures = NO_FIGURES if errors is None else errors.statistics()
-    return document(solution, Extent.of(solution, errors), errors, figures, consistency(solution, errors), outages)
+    figures = Figures(reference, outages, solution.geodetic)
+    figures.add(solution)
+    return document(solution, figures)
 
 
-@dataclass(frozen=True)
-class Extent:
-    """How long a solution is, and how much of it is good."""
-
-    first: float
-    """s"""
-    last: float
-    """s"""
-    epochs: int
-    interval: float
-    """median, s"""
-    broken: int
-    """epochs that are not finite"""
-    uncovered: int
-    """epochs without reference"""
-
-    @classmethod
-    def of(cls, solution: Solution, errors: Errors | None) -> Extent:
-        """Count the epochs of a whole solution."""
-        time = solution.time
-        return cls(
-            first=float(time[0]) if time.size else 0.0,
-            last=float(time[-1]) if time.size else 0.0,
-            epochs=time.size,
-            interval=float(np.median(np.diff(time))) if time.size > 1 else np.nan,
-            broken=int(np.count_nonzero(~np.isfinite(solution.position).all(axis=1))),
-            uncovered=0 if errors is None else errors.epochs_without_reference,
-        )
-
-
-def document(
-    solution: Solution,
-    extent: Extent,
-    errors: Errors | None,
-    figures: Mapping[str, float | None],
-    consistent: Mapping[str, float | None],
-    outages: Sequence[Interval],
-) -> Document:
-    """Return the `run` document from its parts; of the solution only what has no row per epoch is looked at.
-
-    `errors` are those of all epochs, or of the ones that outage statistic and drift come from.
-    """
+def document(solution: Solution, figures: Figures) -> Document:
+    """Return the `run` document of figures; of the solution only what has no row per epoch is looked at."""
+    epochs, errors = figures.epochs, figures.errors
     whole = {
         "polyins": __version__,
         "method": solution.method,
         "imus": solution.imus,
-        "rate_hz": round(1.0 / extent.interval, 6),
-        "duration_s": extent.last - extent.first,
-        "epochs": extent.epochs,
+        "rate_hz": round(1.0 / epochs.interval, 6),
+        "duration_s": epochs.duration,
+        "epochs": epochs.count,
         "filter_s": solution.filter_s,
-        "us_per_epoch": 1e6 * solution.filter_s / extent.epochs if extent.epochs else None,
+        "us_per_epoch": 1e6 * solution.filter_s / epochs.count if epochs.count else None,
         "first_call_s": solution.first_call_s,
-        "reference": figures,
-        "outages": outage_statistic(errors, outages),
+        "reference": figures.reference,
+        "outages": outage_statistic(errors, figures.outages),
         "drift": drift(errors),
-        "consistency": consistent,
+        "consistency": {"nees_position": figures.nees_position, "nis_gnss": mean_nis(solution.innovations)},
         "gnss": _gnss(solution.innovations),
         "measurements": {name: _measured(one) for name, one in solution.measurements.items()},
         "offsets": {
@@ -111,7 +68,7 @@ def document(
         "start": solution.start,
         "faults": list(solution.faults),
         "mounting": _mounting(solution),
-        "warnings": [*solution.warnings, *_warnings(extent, errors, outages)],
+        "warnings": [*solution.warnings, *_warnings(figures)],
     }
     return {key: plain(value) for key, value in whole.items()}
 
@@ -255,27 +212,22 @@ def _mounting(solution: Solution) -> Document:
     }
 
 
-def _warnings(extent: Extent, errors: Errors | None, outages: Sequence[Interval]) -> list[str]:
-    found = []
-    if extent.broken:
-        found.append(f"the solution is not finite at {extent.broken} of {extent.epochs} epochs: it diverged")
-    if errors is not None:
-        found.extend(_coverage_warnings(extent, errors, outages))
-    return found
-
-
-def _coverage_warnings(extent: Extent, errors: Errors, outages: Sequence[Interval]) -> list[str]:
-    found = []
-    share = extent.uncovered / max(extent.epochs, 1)
+def _warnings(figures: Figures) -> list[str]:
+    found, epochs, errors = [], figures.epochs, figures.errors
+    if epochs.broken:
+        found.append(f"the solution is not finite at {epochs.broken} of {epochs.count} epochs: it diverged")
+    if errors is None:
+        return found
+    share = epochs.uncovered / max(epochs.count, 1)
     # streams hardly ever begin and end together
-    if share > NEGLIGIBLE_SHARE and share * (extent.last - extent.first) >= NEGLIGIBLE_S:
+    if share > NEGLIGIBLE_SHARE and share * epochs.duration >= NEGLIGIBLE_S:
         found.append(
-            f"reference: covers {extent.epochs - extent.uncovered} of {extent.epochs} epochs; "
-            f"{extent.uncovered} are left out of the errors"
+            f"reference: covers {epochs.count - epochs.uncovered} of {epochs.count} epochs; "
+            f"{epochs.uncovered} are left out of the errors"
         )
     found.extend(
         f"outage {begin:.3f} s to {end:.3f} s: solution and reference do not cover all of it; its maximum may be larger"
-        for begin, end in partly_covered(errors, outages)
+        for begin, end in partly_covered(errors, figures.outages, epochs.interval)
     )
     return found
 

@@ -90,6 +90,20 @@ class Reference:
     lever_arm: Vector = field(default_factory=zero_vector)
     """The reference's point in the array frame, m."""
 
+    def between(self, first: int, last: int) -> Reference:
+        """Return rows first ... last - 1."""
+
+        def of(values: Array | None) -> Array | None:
+            return None if values is None else values[first:last]
+
+        return replace(
+            self,
+            time=self.time[first:last],
+            position=self.position[first:last],
+            velocity=of(self.velocity),
+            attitude=of(self.attitude),
+        )
+
 
 @dataclass(frozen=True)
 class StartOptions:

@@ -19,7 +19,8 @@ from polyins.checks import stream_checks
 from polyins.config import Config
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
-from polyins.evaluation.running import Running
+from polyins.evaluation.figures import Figures
+from polyins.evaluation.summary import document
 from polyins.files import find
 from polyins.formats.columns import PARQUET_MAGIC
 from polyins.formats.rows import ImuRows
@@ -113,7 +114,7 @@ def run(
     if row.bank == "one":
         recording = recording.subset([imu])
     laid_out, end = _lay_out(row, recording)
-    judge = Running(recording.head.reference, recording.head.outages, recording.head.geodetic)
+    figures = Figures(recording.head.reference, recording.head.outages, recording.head.geodetic)
     begin = clock.perf_counter()
     laid_out.advance(1, 1)
     first_call_s = clock.perf_counter() - begin
@@ -125,13 +126,13 @@ def run(
             begin = clock.thread_time()
             part = _navigate(laid_out, stretch)
             filter_s += clock.thread_time() - begin
-            judge.add(part)
+            figures.add(part)
             writer.add(part)
             if progress:
                 progress(float((stretch.time[-1] - laid_out.start.time) / (end - laid_out.start.time)))
         whole = _whole(part, recording, filter_s, first_call_s)
         writer.finish(whole)
-    return judge.document(whole)
+    return document(whole, figures)
 
 
 def _can_be_streamed(config: Config, document: Document) -> bool:
