@@ -1,4 +1,4 @@
-"""A whole recording through the engine, and what comes out as a Solution."""
+"""A recording through the engine, whole or stretch by stretch, and what comes out as a Solution."""
 
 from __future__ import annotations
 
@@ -48,6 +48,8 @@ class Prepared:
     navigators: Navigators
     inputs: Inputs
     outputs: Outputs
+    schedule: wheels.Schedule
+    """when it measures by itself after these epochs"""
     full_matrices: tuple[Array, Array] | None = None
     """work arrays of the dense covariance"""
     loop: Callable[..., None] = engine.run
@@ -71,6 +73,15 @@ class Prepared:
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
         self.loop(self.navigators, self.inputs, self.outputs, self.full_matrices, first, last)
+
+    def at(self, stretch: Aligned) -> Prepared:
+        """Return the run at further epochs, of which the first is the last that it has taken."""
+        begin = float(stretch.time[0]) + self.recording.options.gnss_snap
+        inputs = inputs_of(self, stretch, begin)
+        outputs = empty_outputs(inputs, self.plan, self.outputs.log.shape[2])
+        for place in (places.NEXT_EVENT, places.NEXT_LOG):
+            self.state.scalars[place] = 0.0
+        return replace(self, aligned=stretch, inputs=inputs, outputs=outputs)
 
 
 def run(
@@ -149,23 +160,22 @@ def start_of(row: Method, recording: Recording, aligned: Aligned) -> Start:
 
 
 def lay_out(
-    row: Method, choice: Choice, recording: Recording, aligned: Aligned, start: Start, end: float | None = None
+    row: Method, choice: Choice, recording: Recording, aligned: Aligned, start: Start, *, gaps: bool | None = None
 ) -> Prepared:
     """Lay out the IMUs of a choice from the epoch at which they start; the events are those of the recording.
 
-    `end`: of the run, where `aligned` is but its beginning, s.
+    `gaps`: whether any IMU falls silent, where `aligned` is but the beginning of the run.
     """
     interval = float(aligned.time[1] - aligned.time[0])
     start = alignment.levelled(start, recording.rig, aligned.increments[0], interval)
     seats = layout.seat(row, choice, recording.rig, start)
-    order = list(choice.blocks[0]) if row.bank == "mean" else seats.order
     first = aligned.increments[0][:, seats.order]
     memory, navigators = layout.lay_out(row, choice, seats, recording, start, first, interval)
-    navigators.plan.settings[places.LOG_EVERY] = max(1, round(aligned.rate_hz))
-    inputs = inputs_of(choice, order, recording, aligned, start, end)
-    navigators.plan.settings[places.MAY_BE_SILENT] = len(inputs.present) > 0
-    engine.begin(navigators, inputs.increments[0], interval)
-    return Prepared(
+    settings = navigators.plan.settings
+    settings[places.LOG_EVERY] = log_every(aligned)
+    settings[places.MAY_BE_SILENT] = _may_be_silent(recording, aligned.missing) if gaps is None else gaps
+    nothing = np.empty(0)
+    run = Prepared(
         method=row,
         recording=recording,
         aligned=aligned,
@@ -174,11 +184,24 @@ def lay_out(
         bank=seats,
         memory=memory,
         navigators=navigators,
-        inputs=inputs,
-        outputs=empty_outputs(
-            len(aligned.time), len(inputs.event_time), len(order), navigators.plan, logged_errors(recording)
-        ),
+        inputs=Inputs(nothing, nothing, nothing, nothing, *events.merged()),
+        outputs=Outputs(nothing, nothing, nothing, nothing, nothing, nothing),
+        schedule=schedule_of(choice, recording, start),
     )
+    inputs = inputs_of(run, aligned, float(aligned.time[0]))
+    engine.begin(navigators, inputs.increments[0], interval)
+    return replace(run, inputs=inputs, outputs=empty_outputs(inputs, run.plan, logged_errors(recording)))
+
+
+def log_every(aligned: Aligned) -> int:
+    """Return after how many epochs the errors of the IMUs are logged: about a second."""
+    return max(1, round(aligned.rate_hz))
+
+
+def _may_be_silent(recording: Recording, missing: NDArray[np.bool_]) -> bool:
+    """Whether IMUs have gaps; where none has data, an array is bridged."""
+    some = missing.any(axis=1)
+    return bool(some.any() if recording.rig.has_wheels else (some & ~missing.all(axis=1)).any())
 
 
 def logged_errors(recording: Recording) -> int:
@@ -187,26 +210,24 @@ def logged_errors(recording: Recording) -> int:
     return layout.states_of(rig) - NAVIGATION if rig.has_wheels or rig.sensors else IMU_ERRORS
 
 
-def inputs_of(
-    choice: Choice, order: list[int], recording: Recording, aligned: Aligned, start: Start, end: float | None = None
-) -> Inputs:
-    """Return the aligned recording as the engine takes it; `order`: of each lane the IMU that stands in it."""
-    rig, missing = recording.rig, aligned.missing
+def inputs_of(run: Prepared, aligned: Aligned, begin: float) -> Inputs:
+    """Return further epochs of a run as the engine takes them, with what is measured after `begin`, s."""
+    rig, missing, start, choice = run.recording.rig, aligned.missing, run.start, run.choice
     whole = rigid.completed(rig, aligned, start.imu_errors)
-    present = np.empty((0, len(order)), dtype=np.uint8)
-    if (missing.any() and not (missing.all(axis=1) | ~missing.any(axis=1)).all()) or (missing.any() and rig.has_wheels):
-        present = np.ascontiguousarray(present_of(recording, missing)[:, order])
+    present = np.empty((0, len(run.order)), dtype=np.uint8)
+    if run.plan.settings[places.MAY_BE_SILENT]:
+        present = np.ascontiguousarray(present_of(run.recording, missing)[:, run.order])
     intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
     travel = np.empty((0, 2))
     if choice.speed:
         lacking = rigid.presence(rig, missing) == rigid.NOTHING
         travel = wheels.travel(rig, choice.speed, whole.increments, intervals, lacking, start.imu_errors[:, :3])
-    shown = events.of_recording(recording, aligned.time[0], aligned.time[-1] if end is None else end)
-    schedule = schedule_of(choice, recording, start)
+    options = run.recording.options
+    shown = events.of_recording(run.recording, begin, float(aligned.time[-1]) + options.gnss_snap)
     lateral = travel[1:, 1] if len(travel) else np.zeros(len(intervals) - 1)
-    due = schedule.events(aligned.time[1:], intervals[1:], lateral)
-    queue = events.merged(events.scheduled(due, aligned.time[1:], recording.options, recording.rig), shown)
-    return Inputs(aligned.time, np.ascontiguousarray(whole.increments[:, :, order]), present, travel, *queue)
+    due = run.schedule.events(aligned.time[1:], intervals[1:], lateral)
+    queue = events.merged(events.scheduled(due, aligned.time[1:], options, rig), shown)
+    return Inputs(aligned.time, np.ascontiguousarray(whole.increments[:, :, run.order]), present, travel, *queue)
 
 
 def present_of(recording: Recording, missing: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -223,8 +244,9 @@ def schedule_of(choice: Choice, recording: Recording, start: Start) -> wheels.Sc
     return wheels.Schedule(start.time, recording.options, wheels=bool(choice.speed), several=several)
 
 
-def empty_outputs(epochs: int, count: int, imus: int, plan: Plan, errors: int) -> Outputs:
-    """Return empty arrays for what a run with so many events writes; `errors` are the slow ones that are logged."""
+def empty_outputs(inputs: Inputs, plan: Plan, errors: int) -> Outputs:
+    """Return empty arrays for what a run writes of its inputs; `errors` are the slow ones that are logged."""
+    epochs, count, imus = len(inputs.time), len(inputs.event_time), inputs.increments.shape[2]
     log_rows = int((epochs - 2) // plan.settings[places.LOG_EVERY]) + 1 if epochs > 1 else 0
     return Outputs(
         states=np.empty((epochs, 10)),
@@ -254,7 +276,7 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         velocity_variance=variances[:, 3:6],
         phi_covariance=variances[:, 6:12],
         point=point,
-        imus=len(recording.imus),
+        imus=len(recording.rig.imus),
         imu_names=tuple(run.bank.members[i].imu.name for i in lanes),
         imu_error_time=outputs.log_time,
         imu_errors=log[:, 0, :, :12],

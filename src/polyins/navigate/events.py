@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,25 +71,36 @@ def merged(*streams: Events) -> Events:
 
 def of_recording(recording: Recording, begin: float, end: float) -> Events:
     """Return what the streams of a recording say after `begin` and up to `end`, s, but for outages of GNSS."""
-    return merged(*(_within(stream, begin, end) for stream in _streams(recording)))
+    return merged(*_of_gnss(recording, begin, end), *_of_sensors(recording, begin, end))
 
 
-def _within(stream: Events, begin: float, end: float) -> Events:
-    return stream.at((stream.time > begin) & (stream.time <= end))
-
-
-def _streams(recording: Recording) -> list[Events]:
-    found = []
+def _of_gnss(recording: Recording, begin: float, end: float) -> list[Events]:
     gnss, antenna = recording.gnss, recording.rig.antenna
-    if gnss is not None:
-        shown = np.ones(len(gnss.time), dtype=bool)
-        for begin, end in recording.outages:
-            shown &= ~((gnss.time > begin) & (gnss.time < end))
-        found.append(of_point(kinds.GNSS_POSITION, gnss.time, gnss.position, antenna, gnss.position_std).at(shown))
-        if gnss.velocity is not None and gnss.velocity_std is not None:
-            velocities = of_point(kinds.GNSS_VELOCITY, gnss.time, gnss.velocity, antenna, gnss.velocity_std)
-            found.append(velocities.at(shown & (gnss.velocity_std > 0.0).any(axis=1)))
-    return found + [of_sensor(stream, recording.rig) for stream in recording.aiding]
+    if gnss is None:
+        return []
+    shown = _within(gnss.time, begin, end)
+    for first, last in recording.outages:
+        shown &= ~((gnss.time > first) & (gnss.time < last))
+    rows = np.flatnonzero(shown)
+    found = [of_point(kinds.GNSS_POSITION, gnss.time[rows], gnss.position[rows], antenna, gnss.position_std[rows])]
+    if gnss.velocity is not None and gnss.velocity_std is not None:
+        rows = np.flatnonzero(shown & (gnss.velocity_std > 0.0).any(axis=1))
+        std = gnss.velocity_std[rows]
+        found.append(of_point(kinds.GNSS_VELOCITY, gnss.time[rows], gnss.velocity[rows], antenna, std))
+    return found
+
+
+def _of_sensors(recording: Recording, begin: float, end: float) -> list[Events]:
+    found = []
+    for stream in recording.aiding:
+        shown = _within(stream.time, begin, end)
+        part = replace(stream, time=stream.time[shown], value=stream.value[shown], std=stream.std[shown])
+        found.append(of_sensor(part, recording.rig))
+    return found
+
+
+def _within(time: Array, begin: float, end: float) -> NDArray[np.bool_]:
+    return (time > begin) & (time <= end)
 
 
 def of_sensor(stream: AidingStream, rig: Rig) -> Events:

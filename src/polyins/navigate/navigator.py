@@ -22,7 +22,6 @@ from polyins.navigate import batch, checkpoint, events
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
-from polyins.navigate.state import MAY_BE_SILENT
 from polyins.navigate.timeline import Timeline
 from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
@@ -279,8 +278,7 @@ class Navigator:
     def _new_timeline(self, time: Array, increments: Array) -> Timeline:
         """Lay the method out for its first two epochs."""
         aligned = Aligned(time, increments, (), np.zeros((len(time), len(self._taken)), dtype=bool))
-        prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start)
-        prepared.plan.settings[MAY_BE_SILENT] = True
+        prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start, gaps=True)
         self._order = prepared.order
         self._schedule = batch.schedule_of(self._choice, self._recording, self.start)
         return Timeline(prepared, self.delay)

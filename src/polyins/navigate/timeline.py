@@ -131,7 +131,7 @@ class Timeline:
             event_value=np.zeros((events, VALUES)),
             event_variance=np.zeros((events, 3)),
         )
-        outputs = empty_outputs(epochs, events, imus, self.run.plan, self.run.outputs.log.shape[2])
+        outputs = empty_outputs(inputs, self.run.plan, self.run.outputs.log.shape[2])
         self.run = replace(self.run, inputs=inputs, outputs=outputs)
         self._notes = np.zeros((epochs // STRIDE + 1, len(self.run.memory)))
 
