@@ -378,10 +378,11 @@ def test_every_public_name_is_listed() -> None:
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a short run."""
     from polyins.tools import results
+    from polyins.tools.comparison import Files
 
     folder = tmp_path_factory.mktemp("written")
     recording = pi.simulate(scenario.Scenario(duration_s=40, static_s=10, rate_hz=50, imus=scenario.Board(count=2)))
-    comparison = pi.compare(recording, ["single", "enav-fusion"])
+    comparison = pi.compare(recording, ["single", "enav-fusion"], files=Files(folder))
     results.write_comparison(folder, recording, comparison, report=False)
     return folder
 

@@ -21,6 +21,9 @@ from polyins.version import __version__
 
 if TYPE_CHECKING:
     from polyins.model.recording import Recording
+    from polyins.reading.loading import Settings
+    from polyins.reading.long_recording import LongRecording
+    from polyins.tools.comparison import Files
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
@@ -86,12 +89,13 @@ def demo(out: Path) -> None:
     from polyins.simulation import files
     from polyins.simulation.run import simulate as drive
     from polyins.simulation.scenario import demo as scenario
+    from polyins.tools.comparison import Files
 
     say("simulating a drive with 16 IMUs and GNSS ...")
     with progress("simulating"):
         config = files.write(drive(scenario()), out / "recording")
     say(f"recording: {config}")
-    _compare(config, None, out, as_json=False, report=True)
+    _compare(config, None, Files(out), as_json=False, no_report=False)
 
 
 @cli.command()
@@ -107,11 +111,9 @@ def demo(out: Path) -> None:
 @no_report_option
 def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool) -> None:
     """Run one method over one recording (polyins YAML, or a KF-GINS or Wheel-INS configuration)."""
-    from polyins.evaluation.summary import summarize
     from polyins.model.methods import find_method
-    from polyins.navigate import batch
     from polyins.reading import loading
-    from polyins.tools import results, streaming
+    from polyins.tools import navigation, results
 
     gc.set_threshold(COLLECT_AFTER)
     if method is not None:
@@ -119,33 +121,32 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     if imu is not None and method not in (None, "single"):
         raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
     with progress("reading"):
-        settings = loading.read_config(config)
-        long = streaming.open_long(settings)
-        recording = loading.load_settings(settings) if long is None else long.head
-    if imu is not None and recording.rig.has_wheels:
+        recording = _open(loading.read_config(config))
+    known = navigation.head(recording)
+    if imu is not None and known.rig.has_wheels:
         raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
-    name = method or _usual_method(recording, imu)
-    index = _imu_index([one.name for one in recording.rig.imus], imu)
+    name = method or _usual_method(known, imu)
+    index = _imu_index([one.name for one in known.rig.imus], imu)
     make_folder(out)
-    report = not no_report and long is None
-    if long is not None:
-        with compilation_said(), progress(name) as update:
-            summary = streaming.run(long, out, name, imu=index, progress=update)
-        results.write_summary(out, recording, summary)
-    else:
-        with compilation_said(), progress(name) as update:
-            solution = batch.run(recording, name, imu=index, progress=update)
-        summary = summarize(solution, recording.reference, recording.outages)
-        with progress("writing"):
-            results.write_run(out, recording, solution, summary, report=report)
+    with compilation_said(), progress(name) as update:
+        outcome = navigation.run(recording, name, imu=index, folders={out: None}, progress=update)
+    with progress("writing"):
+        results.write_run(out, recording, outcome, report=not no_report)
+    summary = outcome.summary
     if as_json:
         _print_json(summary)
         return
-    print_summaries(recording.name, {name: summary}, {})
+    print_summaries(known.name, {name: summary}, {})
     say("start: " + ", ".join(f"{key} {value}" for key, value in summary["start"].items()))
-    if long is not None and not no_report:
-        say(f"report: none is made of a recording with {long.rows} rows of IMU data")
-    say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
+    say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+
+
+def _open(settings: Settings) -> Recording | LongRecording:
+    """Read a recording, or open its files if it is longer than memory."""
+    from polyins.reading.loading import load_settings
+    from polyins.reading.long_recording import open_long
+
+    return open_long(settings) or load_settings(settings)
 
 
 def _print_json(document: Mapping[str, Any]) -> None:
@@ -172,62 +173,75 @@ def _imu_index(names: list[str], wanted: str | None) -> int:
 @click.argument("configs", metavar="CONFIG [CONFIG ...]", type=FILE, nargs=-1, required=True)
 @click.option("--methods", default=None, help="Names separated by commas; unless given all that the rig allows.")
 @click.option("--threads", type=click.IntRange(1), default=None, help="Runs at once; one for each core unless given.")
+@click.option(
+    "--single-rate",
+    type=click.FloatRange(0.0, 1e4),
+    default=10.0,
+    show_default=True,
+    help="Rows a second in the files of single IMUs; 0: every epoch.",
+)
 @out_option("polyins-out")
 @as_json_option
 @no_report_option
-def compare(
-    configs: tuple[Path, ...], methods: str | None, threads: int | None, out: Path, as_json: bool, no_report: bool
-) -> None:
+def compare(configs: tuple[Path, ...], methods: str | None, single_rate: float, out: Path, **options: Any) -> None:
     """Run several methods over one recording or more, and each IMU on its own."""
     from polyins.model.methods import find_method
+    from polyins.tools.comparison import Files
 
     gc.set_threshold(COLLECT_AFTER)
     names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else None
+    files = Files(out, single_rate or None)
     if len(configs) > 1:
-        _compare_several(configs, names, out, as_json, report=not no_report, threads=threads)
+        _compare_several(configs, names, files, **options)
     else:
-        _compare(configs[0], names, out, as_json, report=not no_report, threads=threads)
+        _compare(configs[0], names, files, **options)
 
 
 def _compare(
-    config: Path, methods: list[str] | None, out: Path, as_json: bool, report: bool, threads: int | None = None
+    config: Path, methods: list[str] | None, files: Files, as_json: bool, no_report: bool, threads: int | None = None
 ) -> None:
-    from polyins.reading.loading import load
-    from polyins.tools import results
+    from polyins.reading.loading import read_config
+    from polyins.tools import navigation, results
     from polyins.tools.comparison import compare as run_all
 
+    out = files.folder
     with progress("reading"):
-        recording = load(config)
+        recording = _open(read_config(config))
     make_folder(out)
     with compilation_said(), progress("compare") as update:
-        result = run_all(recording, methods, threads=threads, progress=update)
+        result = run_all(recording, methods, files=files, threads=threads, progress=update)
     with progress("writing"):
-        results.write_comparison(out, recording, result, report=report)
+        results.write_comparison(out, recording, result, report=not no_report)
     if as_json:
         _print_json(result.document)
         return
-    _print_comparison(recording.name, result.document)
-    say(f"files: {out}" + (f", report: {out / 'report.html'}" if report else ""))
+    _print_comparison(navigation.head(recording).name, result.document)
+    say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
 
 
 def _compare_several(
-    configs: tuple[Path, ...], methods: list[str] | None, out: Path, as_json: bool, report: bool, threads: int | None
+    configs: tuple[Path, ...],
+    methods: list[str] | None,
+    files: Files,
+    as_json: bool,
+    no_report: bool,
+    threads: int | None,
 ) -> None:
     from polyins.formats.documents import write_document
-    from polyins.reading.loading import load_settings, names_of, read_config
+    from polyins.reading.loading import names_of, read_config
     from polyins.tools import results
     from polyins.tools.comparison import Comparison, compare_several
 
+    out = files.folder
     settings = [read_config(config) for config in configs]
-    readers = {name: partial(load_settings, one) for name, one in zip(names_of(settings), settings, strict=True)}
+    readers = {name: partial(_open, one) for name, one in zip(names_of(settings), settings, strict=True)}
     make_folder(out)
 
-    def write(name: str, recording: Recording, result: Comparison) -> None:
-        make_folder(out / name)
-        results.write_comparison(out / name, recording, result, report=report)
+    def write(name: str, recording: Recording | LongRecording, result: Comparison) -> None:
+        results.write_comparison(out / name, recording, result, report=not no_report)
 
     with compilation_said(), progress("compare") as update:
-        document = compare_several(readers, write, methods, threads=threads, progress=update)
+        document = compare_several(readers, write, methods, files=files, threads=threads, progress=update)
     write_document(out / "summary.json", document)
     if as_json:
         _print_json(document)
@@ -236,7 +250,7 @@ def _compare_several(
         _print_comparison(name, part)
     pooled = document["pooled"]
     print_summaries(f"over {len(configs)} recordings", pooled["methods"], pooled["ratio_to_single"])
-    say(f"files: {out}" + (f", reports: {out / '*' / 'report.html'}" if report else ""))
+    say(f"files: {out}" + ("" if no_report else f", reports: {out / '*' / 'report.html'}"))
 
 
 def _print_comparison(name: str, document: dict[str, Any]) -> None:

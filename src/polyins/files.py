@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO, cast
 
 from polyins.errors import InputError
 
@@ -54,16 +55,23 @@ def read_bytes(path: str | Path) -> bytes:
     return content
 
 
-def read_head(path: str | Path, count: int) -> bytes:
-    """Return the first bytes of a file, unpacked if its name ends in `.gz`; raises InputError as `read_bytes` does."""
+@contextmanager
+def opened(path: str | Path) -> Iterator[IO[bytes]]:
+    """Open a file to be read in order, unpacked if its name ends in `.gz`; raises InputError as `read_bytes` does."""
     found = find(path)
-    if found.suffix == ".gz":
-        return read_bytes(path)[:count]
     try:
-        with found.open("rb") as file:
-            head = file.read(count)
+        with gzip.open(found) if found.suffix == ".gz" else found.open("rb") as file:
+            yield cast(IO[bytes], file)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise InputError(f"{found}: cannot be unpacked ({error}); expected a whole gzip file") from error
     except OSError as error:
         raise InputError(f"{found}: cannot be read ({error.strerror})") from error
+
+
+def read_head(path: str | Path, count: int) -> bytes:
+    """Return the first bytes of a file, unpacked if its name ends in `.gz`; raises InputError as `read_bytes` does."""
+    with opened(path) as file:
+        head = file.read(count)
     return head if head.strip() else read_bytes(path)[:count]
 
 

@@ -7,7 +7,7 @@ from synthetic_solutions import drifting, drive, recording, reference
 
 from polyins.evaluation.summary import comparison, summarize
 from polyins.model.recording import Recording
-from polyins.report import write_report
+from polyins.report import Scene, write_report
 
 OUTAGES = ((1030.0, 1060.0), (1120.0, 1150.0), (1210.0, 1240.0))
 METHODS = {"single": (1, 0.02), "imu-fusion": (1, 0.01), "nav-fusion": (6, 0.01), "enav-fusion": (6, 0.009)}
@@ -40,5 +40,5 @@ def report(
     made_runs: dict, made_recording: Recording, compared: dict, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    write_report(path, made_runs, made_recording, compared)
+    write_report(path, Scene.of(made_runs, made_recording, compared), compared)
     return path

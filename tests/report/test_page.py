@@ -7,7 +7,7 @@ from html import unescape
 import pytest
 
 from polyins.errors import InputError
-from polyins.report import write_report
+from polyins.report import Scene, write_report
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_warnings_of_some_runs_name_them(made_runs, made_recording, tmp_path):
         name: (made, {**summary, "warnings": ["slow"] if name == "single" else []})
         for name, (made, summary) in made_runs.items()
     }
-    write_report(tmp_path / "report.html", runs, made_recording)
+    write_report(tmp_path / "report.html", Scene.of(runs, made_recording))
     warnings = words((tmp_path / "report.html").read_text(encoding="utf-8"), "warnings")
     assert "single: slow" in warnings
 
@@ -71,7 +71,7 @@ def test_columns_in_which_nothing_is_known_are_left_out(made_runs, made_recordin
         "outages": {"count": 0, "length_s": None, "horizontal_max_rms_m": None, "each_m": []},
     }
     bare = replace(made_recording, reference=None, outages=(), config_text="", warnings=())
-    write_report(tmp_path / "report.html", {"single": (made, unknown)}, bare)
+    write_report(tmp_path / "report.html", Scene.of({"single": (made, unknown)}, bare))
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "rmse" not in words(text, "figures")
     assert "NIS GNSS" in words(text, "figures")
@@ -82,5 +82,5 @@ def test_columns_in_which_nothing_is_known_are_left_out(made_runs, made_recordin
 def test_a_failure_leaves_no_half_page(made_runs, made_recording, tmp_path):
     wrong = replace(made_recording, reference=replace(made_recording.reference, time=made_recording.reference.time[:1]))
     with pytest.raises(InputError, match="reference: 1 epochs"):
-        write_report(tmp_path / "report.html", made_runs, wrong)
+        write_report(tmp_path / "report.html", Scene.of(made_runs, wrong))
     assert list(tmp_path.iterdir()) == []

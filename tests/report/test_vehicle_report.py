@@ -114,7 +114,7 @@ def test_the_table_shows_drift_with_wheels_only(scene, made_runs, made_recording
 def test_the_page_has_no_section_without_content(runs: dict, driven: Recording, tmp_path: Path):
     summaries = {name: summary for name, (_, summary) in runs.items()}
     compared = comparison(summaries, [summaries["wheel-ins"]] * 2, "wheel-ins")
-    write_report(tmp_path / "report.html", runs, driven, compared)
+    write_report(tmp_path / "report.html", Scene.of(runs, driven, compared), compared)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     sections = re.findall(r'<div class="plot[^"]*"><div>.*?id="plot-(\w+)"', text, re.DOTALL)
     assert sections == ["trajectory", "drift", "position", "attitude", "imus"]

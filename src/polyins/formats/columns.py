@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.files import find, read_bytes, read_head
+from polyins.files import find, opened, read_bytes, read_head
 from polyins.formats.arrow_arrays import to_numpy
 from polyins.formats.rows import Source
-from polyins.model.recording import Array
+from polyins.model.recording import USUAL_OF, Array
 
 Column = str | int
 """A column's name, or its number counted from 1."""
 
 PARQUET_MAGIC = b"PAR1"
 HEAD_BYTES = 16384
+PIECE_ROWS = max(16_384, USUAL_OF + 1)
+"""of a Parquet file read in order"""
+PIECE_BYTES = 1 << 21
+"""of a text read in order"""
+BUFFER_BYTES = 1 << 18
+"""of a column; without it a whole row group would be held"""
 
 
 @dataclass(frozen=True)
@@ -34,10 +40,17 @@ class Layout:
     """line of the first row, counted from 1"""
 
 
+def is_parquet(path: str | Path) -> bool:
+    """Whether a file, packed or not, is Parquet by its first bytes."""
+    return read_head(path, len(PARQUET_MAGIC)) == PARQUET_MAGIC
+
+
 def column_names(path: str | Path) -> tuple[str, ...]:
     """Return the names of all columns; those of a file without a header are empty."""
-    content = read_bytes(path)
-    return _parquet_names(path, content) if content[:4] == PARQUET_MAGIC else layout(path, content).names
+    head = read_head(path, HEAD_BYTES)
+    if head[:4] != PARQUET_MAGIC:
+        return layout(path, head).names
+    return _parquet_names(path, read_bytes(path) if find(path).suffix == ".gz" else None)
 
 
 def read_columns(
@@ -54,13 +67,53 @@ def read_columns(
     if content[:4] == PARQUET_MAGIC:
         return Source(str(find(path))), _parquet_columns(path, wanted, content)
     table = layout(path, content, header_has)
+    places = [_place(find(path), table.names, column) for column in wanted]
+    values = _text_columns(find(path), _tidy(content, table), table, places, text_is_nan, table.first_line - 1)
+    return Source(str(find(path)), table.first_line), values
+
+
+def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[Source, list[Array]]]:
+    """Read the wanted columns piece by piece, as `read_columns` reads them at once; a packed Parquet file cannot be.
+
+    The first piece has more rows than `usual_interval` looks at.
+    """
+    if is_parquet(path):
+        yield from _parquet_pieces(path, wanted)
+        return
+    found, table, places, line = find(path), None, [], 0
+    for content in _whole_lines(found):
+        if table is None:
+            table = layout(path, content)
+            places = [_place(found, table.names, column) for column in wanted]
+            lines = content.split(b"\n", table.first_line - 1)
+            content, line = lines[-1], table.first_line
+        piece = replace(table, first_line=line)
+        yield Source(str(found), line), _text_columns(found, _tidy(content, piece), piece, places, False, skipped=0)
+        line += content.count(b"\n")
+
+
+def _whole_lines(path: Path) -> Iterator[bytes]:
+    """Give pieces of a text file that end where a line does, the first with the lines of `usual_interval`."""
+    with opened(path) as file:
+        rest, least = b"", 2 * USUAL_OF
+        while more := file.read(PIECE_BYTES):
+            rest += more
+            if rest.count(b"\n") > least:
+                whole, _, rest = rest.rpartition(b"\n")
+                least = 0
+                yield whole + b"\n"
+        if rest.strip():
+            yield rest
+
+
+def _tidy(content: bytes, table: Layout) -> bytes:
+    """Return the content as the parser takes it: one blank between columns, and UTF-8."""
     if not content.isascii():
         content = content.decode(errors="replace").encode()
     if table.delimiter == " ":
         content = re.sub(rb"(?m)^[ \t]+|[ \t]+$", b"", content)
         content = re.sub(rb"[ \t]+", b" ", content)
-    places = [_place(find(path), table.names, column) for column in wanted]
-    return Source(str(find(path)), table.first_line), _text_columns(find(path), content, table, places, text_is_nan)
+    return content
 
 
 def layout(path: str | Path, content: bytes, header_has: str = "") -> Layout:
@@ -112,25 +165,29 @@ def _place(path: Path, names: Sequence[str], column: Column) -> int:
     return names.index(column)
 
 
-def _text_columns(path: Path, content: bytes, table: Layout, places: list[int], text_is_nan: bool) -> list[Array]:
+def _text_columns(
+    path: Path, content: bytes, table: Layout, places: list[int], text_is_nan: bool, skipped: int
+) -> list[Array]:
+    """Return columns of a text; `skipped`: its lines before the first row."""
     from pyarrow import ArrowInvalid, float64
 
     try:
-        columns = _parse(path, content, table, places, float64())
+        columns = _parse(path, content, table, places, float64(), skipped)
     except ArrowInvalid:
         from pyarrow import binary
 
-        cells = _parse(path, content, table, places, binary())
+        cells = _parse(path, content, table, places, binary(), skipped)
         return [_numbers(path, table, place, column, text_is_nan) for place, column in zip(places, cells, strict=True)]
     return [to_numpy(column) for column in columns]
 
 
-def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: Any) -> list[Any]:
+def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: Any, skipped: int) -> list[Any]:
     """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them."""
     from pyarrow import ArrowInvalid, BufferReader, csv
 
     def refuse(row: Any) -> str:
-        bad.append(f"{path}, line {row.number}: {row.actual_columns} columns; expected {row.expected_columns}")
+        line = None if row.number is None else row.number + table.first_line - 1 - skipped
+        bad.append(f"{path}, line {line}: {row.actual_columns} columns; expected {row.expected_columns}")
         return "error"
 
     bad: list[str] = []
@@ -139,7 +196,7 @@ def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: A
     try:
         parsed = csv.read_csv(
             BufferReader(content),
-            csv.ReadOptions(column_names=names, skip_rows=table.first_line - 1, use_threads=False),
+            csv.ReadOptions(column_names=names, skip_rows=skipped, use_threads=False),
             csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=refuse),
             csv.ConvertOptions(
                 include_columns=sorted(set(wanted)),
@@ -180,6 +237,19 @@ def _parquet_names(path: str | Path, content: bytes | None = None) -> tuple[str,
         return tuple(parquet.read_schema(find(path) if content is None else BufferReader(content)).names)
     except (ArrowException, OSError) as error:
         raise InputError(f"{find(path)}: is not a whole Parquet file ({str(error).splitlines()[0]})") from error
+
+
+def _parquet_pieces(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[Source, list[Array]]]:
+    from pyarrow import ArrowException, chunked_array, float64, parquet
+
+    found, names = find(path), parquet_places(path, wanted)
+    try:
+        file = parquet.ParquetFile(found, buffer_size=BUFFER_BYTES, pre_buffer=False)
+        for batch in file.iter_batches(PIECE_ROWS, columns=names, use_threads=False):
+            columns = (chunked_array([batch.column(name).cast(float64(), safe=False)]) for name in names)
+            yield Source(str(found)), [to_numpy(column) for column in columns]
+    except (ArrowException, OSError) as error:
+        raise InputError(f"{found}: cannot be read ({str(error).splitlines()[0]})") from error
 
 
 def _parquet_columns(path: str | Path, wanted: Sequence[Column], content: bytes | None = None) -> list[Array]:

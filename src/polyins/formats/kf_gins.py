@@ -5,16 +5,23 @@ Columns as that program documents them. Angles are degrees in files and radians 
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.files import find, read_bytes, write_bytes
+from polyins.files import find, opened, read_bytes, read_head, write_bytes
 from polyins.formats.arrow_arrays import to_numpy
+from polyins.formats.columns import HEAD_BYTES, PIECE_ROWS, Column
+from polyins.formats.columns import read_in_order as read_text_in_order
 from polyins.formats.rows import ImuRows, Source, Track, intervals
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG
+
+if TYPE_CHECKING:
+    from polyins.config import ImuColumns
 
 IMU_COLUMNS = 7
 ROW_BYTES = 8 * IMU_COLUMNS
@@ -47,6 +54,29 @@ def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
     increments = rows[:, 1:] * intervals(time)[:, None]
     source = Source(str(find(path)))
     return ImuRows(source, time, increments[:, :3], increments[:, 3:], gyro_unit="rad/s", accel_unit="m/s^2")
+
+
+def columns_of(path: str | Path, *, rates: bool = False) -> ImuColumns:
+    """Return the columns of an IMU file, of `read_rates` or `read_imu`; raises InputError if it has not seven."""
+    from polyins.config import ImuColumns
+
+    head = read_head(path, HEAD_BYTES)
+    if is_text(head) and len(head.splitlines()[0].replace(b",", b" ").split()) != IMU_COLUMNS:
+        raise InputError(f"{find(path)}: expected {IMU_COLUMNS} columns (s, 3 rad, 3 m/s)")
+    gyro, accel = ("rad/s", "m/s^2") if rates else ("rad", "m/s")
+    units = {"gyro": {"names": [2, 3, 4], "unit": gyro}, "accel": {"names": [5, 6, 7], "unit": accel}}
+    return ImuColumns.model_validate({"time": {"name": 1}, **units})
+
+
+def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[Source, list[Array]]]:
+    """Read columns of an IMU file, which have numbers, piece by piece; raises InputError as `read_imu` does."""
+    if is_text(read_head(path, HEAD_BYTES)):
+        yield from read_text_in_order(path, wanted)
+        return
+    with opened(path) as file:
+        while content := file.read(ROW_BYTES * PIECE_ROWS):
+            rows = _binary(path, content)
+            yield Source(str(find(path))), [rows[:, int(number) - 1].copy() for number in wanted]
 
 
 def read_gnss(path: str | Path) -> Track:

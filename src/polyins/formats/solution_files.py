@@ -17,6 +17,7 @@ from polyins.formats.arrow_arrays import texts_to_arrow, to_arrow, to_numpy
 from polyins.formats.documents import plain
 from polyins.model.attitude import euler_angles, euler_variance, quaternions
 from polyins.model.geodesy import displacement
+from polyins.model.recording import usual_interval
 from polyins.model.solution import Solution
 from polyins.version import __version__
 
@@ -28,6 +29,8 @@ Array = NDArray[np.float64]
 SOLUTION = "solution.parquet"
 IMU_ERRORS = "imu_errors.parquet"
 METADATA = b"polyins"
+DOUBLES = ("time_s", "latitude_deg", "longitude_deg", "height_m")
+"""what single precision would round to more than its std; all else is written in it"""
 IMU_ERROR_COLUMNS = (
     *(f"gyro_bias_{axis}_rad_s" for axis in "xyz"),
     *(f"accel_bias_{axis}_m_s2" for axis in "xyz"),
@@ -43,9 +46,12 @@ _VELOCITY_STD = tuple(f"std_{name}" for name in _VELOCITY)
 _PHI_STD = tuple(f"std_phi_{axis}_deg" for axis in _AXES)
 
 
-def write_solution(solution: Solution, folder: Path) -> None:
-    """Write `solution.parquet` and `imu_errors.parquet` into `folder`, which is made if there is none."""
-    with SolutionWriter(folder) as writer:
+def write_solution(solution: Solution, folder: Path, rate_hz: float | None = None) -> None:
+    """Write `solution.parquet` and `imu_errors.parquet` into `folder`, which is made if there is none.
+
+    `rate_hz`: how many rows a second are written of the trajectory; None: every epoch.
+    """
+    with SolutionWriter(folder, rate_hz) as writer:
         writer.add(solution)
         writer.finish(solution)
 
@@ -53,8 +59,13 @@ def write_solution(solution: Solution, folder: Path) -> None:
 class SolutionWriter:
     """The two files of a solution, written part by part; they take their names when the block ends without an error."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, rate_hz: float | None = None) -> None:
+        """`rate_hz`: how many rows a second are written of the trajectory; None: every epoch."""
         folder.mkdir(parents=True, exist_ok=True)
+        self._rate = rate_hz
+        self._period = -1.0
+        """the last of which a row is written, counted from the first epoch"""
+        self._begin = np.nan
         self._stack = ExitStack()
         self._files = [_Table(self._stack, folder / SOLUTION), _Table(self._stack, folder / IMU_ERRORS)]
         self._origin: Array | None = None
@@ -67,10 +78,22 @@ class SolutionWriter:
 
     def add(self, part: Solution) -> None:
         """Write the epochs of a part, which follows the one before."""
-        self._origin = part.position[0] if self._origin is None else self._origin
+        if self._origin is None:
+            self._origin, self._begin = part.position[0], part.time[0]
         trajectory, errors = self._files
-        trajectory.add(_columns(part, self._origin))
+        rows = self._rows(part.time)
+        trajectory.add(_columns(part if rows is None else part.at(rows, np.arange(0)), self._origin))
         errors.add(_imu_error_columns(part))
+
+    def _rows(self, time: Array) -> NDArray[np.intp] | None:
+        """Return the first epoch in each period of 1 / rate; None: all."""
+        if self._rate is None:
+            return None
+        slack = 0.1 * usual_interval(time) if len(time) > 1 else 0.0
+        period = np.floor((time - self._begin + slack) * self._rate)
+        rows = np.flatnonzero(np.diff(period, prepend=self._period) > 0.0)
+        self._period = float(period[-1])
+        return rows
 
     def finish(self, solution: Solution) -> None:
         """Write what is known of the whole solution: of it only what has no row per epoch is looked at."""
@@ -186,7 +209,7 @@ class _Table:
         import pyarrow as pa
 
         rows = len(columns["time_s"])
-        table = pa.table({name: _arrow(values, rows) for name, values in columns.items()})
+        table = pa.table({name: _arrow(name, values, rows) for name, values in columns.items()})
         if self._writer is None:
             self._writer = self._stack.enter_context(_parquet_writer(self._beside, table.schema))
         self._writer.write_table(table)
@@ -210,12 +233,14 @@ def _parquet_writer(path: Path, schema: pa.Schema) -> Any:
     )
 
 
-def _arrow(values: Any, rows: int) -> pa.Array:
+def _arrow(name: str, values: Any, rows: int) -> pa.Array:
     import pyarrow as pa
 
     if values is None:
         return pa.nulls(rows, pa.float64())
-    return values if isinstance(values, pa.Array) else to_arrow(values)
+    if isinstance(values, pa.Array):
+        return values
+    return to_arrow(values if name in DOUBLES else np.asarray(values, dtype=np.float32))
 
 
 def _read(path: Path) -> tuple[pa.Table, dict[str, Any]]:

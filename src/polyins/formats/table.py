@@ -63,10 +63,12 @@ def imu_cells(columns: ImuColumns, rate_hz: float | None = None) -> list[Column]
     return [*columns.gyro.names, *columns.accel.names, *stamp]
 
 
-def imu_rows(source: Source, values: Sequence[Array], columns: ImuColumns, rate_hz: float | None = None) -> ImuRows:
-    """Return the rows of an IMU table from the values of `imu_cells`, each of shape (T,)."""
+def imu_rows(
+    source: Source, values: Sequence[Array], columns: ImuColumns, rate_hz: float | None = None, first_row: int = 0
+) -> ImuRows:
+    """Return rows of an IMU table from the values of `imu_cells`, each of shape (T,); `first_row` counts from 0."""
     if rate_hz or columns.time is None:
-        time = np.arange(len(values[0])) / (rate_hz or 1.0)
+        time = np.arange(first_row, first_row + len(values[0])) / (rate_hz or 1.0)
     else:
         time = values[6] * SECONDS[columns.time.unit]
     gyro, accel = columns.gyro.unit, columns.accel.unit

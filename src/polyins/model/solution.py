@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +37,12 @@ class Innovations:
     axes: tuple[str, ...] = ("north", "east", "down")
     unit: str = "m"
 
-    def until(self, time: float) -> Innovations:
-        """Return those up to a time, s."""
-        kept = self.time <= time
+    @classmethod
+    def joined(cls, parts: Sequence[Innovations]) -> Innovations:
+        """Return those of parts of a recording that follow one another."""
         names = ("time", "residual", "std", "nis", "accepted", "reopened", "velocity_rejected", "rows")
-        return replace(self, **{name: getattr(self, name)[kept] for name in names})
+        whole: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return replace(parts[0], **whole)
 
 
 _NEVER = np.zeros(0, dtype=bool)
@@ -64,6 +67,18 @@ class OffsetEstimate:
     """shape (K,), the unit of its state, see `model.states`"""
     std: Array
     """shape (K,)"""
+
+
+BY_EPOCH = (
+    "time",
+    "position",
+    "velocity",
+    "attitude",
+    "position_variance",
+    "velocity_variance",
+    "phi_covariance",
+)
+BY_LOG = ("imu_error_time", "imu_errors", "imu_error_std")
 
 
 @dataclass(frozen=True)
@@ -116,6 +131,48 @@ class Solution:
     first_call_s: float = 0.0
     """time spent on compiling or loading the kernels"""
     warnings: tuple[str, ...] = ()
+
+    def at(self, epochs: NDArray[np.intp], logs: NDArray[np.intp]) -> Solution:
+        """Return the solution at some of its epochs, with some rows of the log; measurements stay."""
+
+        def of(values: Array | None) -> Array | None:
+            return None if values is None else values[logs]
+
+        offsets = {name: OffsetEstimate(one.value[logs], one.std[logs]) for name, one in self.offsets.items()}
+        return replace(
+            self,
+            **{name: getattr(self, name)[epochs] for name in BY_EPOCH},
+            **{name: getattr(self, name)[logs] for name in BY_LOG},
+            offsets=offsets,
+            mounting=of(self.mounting),
+            mounting_std=of(self.mounting_std),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Solution]) -> Solution:
+        """Return the solution whose parts follow one another; what is said of it as a whole, the last part says."""
+        if len(parts) == 1:
+            return parts[0]
+        last = parts[-1]
+
+        def whole(name: str) -> Any:
+            values = [getattr(part, name) for part in parts]
+            return None if values[0] is None else np.concatenate(values)
+
+        kinds = dict.fromkeys(kind for part in parts for kind in part.measurements)
+        measured = {kind: [part.measurements[kind] for part in parts if kind in part.measurements] for kind in kinds}
+        offsets = {name: [part.offsets[name] for part in parts] for name in last.offsets}
+        return replace(
+            last,
+            **{name: whole(name) for name in (*BY_EPOCH, *BY_LOG, "mounting", "mounting_std")},
+            measurements={kind: Innovations.joined(some) for kind, some in measured.items()},
+            offsets={
+                name: OffsetEstimate(*(np.concatenate([getattr(one, of) for one in some]) for of in ("value", "std")))
+                for name, some in offsets.items()
+            },
+            filter_s=sum(part.filter_s for part in parts),
+            first_call_s=parts[0].first_call_s,
+        )
 
     @property
     def innovations(self) -> Innovations:

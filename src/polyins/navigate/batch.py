@@ -79,8 +79,8 @@ class Prepared:
         begin = float(stretch.time[0]) + self.recording.options.gnss_snap
         inputs = inputs_of(self, stretch, begin)
         outputs = empty_outputs(inputs, self.plan, self.outputs.log.shape[2])
-        for place in (places.NEXT_EVENT, places.NEXT_LOG):
-            self.state.scalars[place] = 0.0
+        for first in (places.NEXT_EVENT, places.NEXT_LOG):
+            self.state.scalars[first] = 0.0
         return replace(self, aligned=stretch, inputs=inputs, outputs=outputs)
 
 

@@ -44,28 +44,61 @@ class Aligned:
         return Aligned(self.time[part], self.increments[part], self.warnings, self.missing[part])
 
 
-def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Sequence[int] | None = None) -> Aligned:
+@dataclass(frozen=True)
+class Whole:
+    """What is known of whole streams, parts of which are aligned."""
+
+    gap_counts: tuple[int, ...]
+    ends: Array
+    """last stamp of each, s, shape (N,)"""
+    intervals: Array
+    """the usual one of each, s, shape (N,)"""
+
+    @classmethod
+    def of(cls, streams: tuple[ImuStream, ...]) -> Whole:
+        """Look at streams that are whole."""
+        intervals = np.array([usual_interval(stream.time) for stream in streams])
+        gaps = (gaps_of(stream.time, usual) for stream, usual in zip(streams, intervals, strict=True))
+        return cls(tuple(map(len, gaps)), np.array([stream.time[-1] for stream in streams]), intervals)
+
+    @property
+    def end(self) -> float:
+        """Where the recording ends, s."""
+        return common_end(self.ends)
+
+    @property
+    def order(self) -> list[int]:
+        """In which their stamps become those of all: a gap in the first one's is one for all."""
+        return sorted(range(len(self.ends)), key=lambda i: (self.gap_counts[i], self.ends[i] < self.end))
+
+
+def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | None = None) -> Aligned:
     """Bring the streams onto the time stamps of the first one without gaps, within their common span.
 
     The increments of the others are shared out between its intervals, so that no rotation or velocity is lost or
     counted twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one,
-    the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. Where the
-    streams are a part of longer ones, `gap_counts` says how many gaps those have. Raises InputError if less than two
-    seconds are common.
+    the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. `whole`: of
+    longer streams, whose parts these are; a part is empty of a stream that has ended. Raises InputError if less than
+    two seconds are common.
     """
-    gaps_by_stream = [gaps_of(stream.time) for stream in streams]
-    time = _common_time(streams, gap_counts or [len(gaps) for gaps in gaps_by_stream])
+    if whole is None:
+        whole = Whole.of(streams)
+        _check_common(streams, whole.end)
+    gaps_by_stream = [gaps_of(*of) for of in zip((stream.time for stream in streams), whole.intervals, strict=True)]
+    time = _common_time(streams, whole)
     on_base: list[tuple[Array, Array]] = []
     missing = np.zeros((len(time), len(streams)), dtype=bool)
     warnings = late_warnings(streams)
     for i, (stream, known) in enumerate(zip(streams, gaps_by_stream, strict=True)):
-        if len(stream.time) == len(time) and np.array_equal(stream.time, time):
+        if not stream.time.size:
+            on_base.append((np.zeros((len(time), 3)), np.zeros((len(time), 3))))
+        elif len(stream.time) == len(time) and np.array_equal(stream.time, time):
             on_base.append((stream.dtheta, stream.dvel))
         else:
-            values = _resample(stream.time, np.hstack([stream.dtheta, stream.dvel]), time)
+            values = _resample(stream, time, float(whole.intervals[i]))
             on_base.append((values[:, :3], values[:, 3:]))
         gaps = [g for g in known if g[1] > time[0] and g[0] < time[-1]]
-        stops = float(stream.time[-1])
+        stops = float(whole.ends[i])
         if time[-1] - stops > LATE:
             gaps.append((stops, float(time[-1])))
         for begin, end in gaps:
@@ -83,10 +116,10 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, gap_counts: Seque
 
 def late_warnings(streams: tuple[ImuStream, ...]) -> list[str]:
     """Say which IMU the others have to wait for."""
-    begins = np.array([stream.time[0] for stream in streams])
+    begins = np.array([stream.time[0] if stream.time.size else -np.inf for stream in streams])
     latest = int(np.argmax(begins))
     wait = float(begins[latest] - begins.min())
-    if wait <= LATE:
+    if not LATE < wait < np.inf:
         return []
     return [
         f"IMU {streams[latest].name}: begins at {begins[latest]:.3f} s, {wait:.1f} s after the first one; what the"
@@ -113,23 +146,25 @@ def _interleaved(streams: Sequence[tuple[Array, Array]], epochs: int) -> Array:
     return increments
 
 
-def _common_time(streams: tuple[ImuStream, ...], gap_counts: Sequence[int]) -> Array:
+def _check_common(streams: tuple[ImuStream, ...], end: float) -> None:
+    begin = max(stream.time[0] for stream in streams)
+    if min(end, *(stream.time[-1] for stream in streams)) - begin < 2.0:
+        spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
+        raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
+
+
+def _common_time(streams: tuple[ImuStream, ...], whole: Whole) -> Array:
     """Return the stamps of the stream with the fewest gaps, filled up in them with those of others.
 
     The time goes on where a stream ends for good while others go on.
     """
-    begin = max(stream.time[0] for stream in streams)
-    ends = np.array([stream.time[-1] for stream in streams])
-    end = common_end(ends)
-    if min(end, ends.min()) - begin < 2.0:
-        spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
-        raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
-    # the first whose gaps are few: a gap in the base is one for all
-    order = sorted(range(len(streams)), key=lambda i: (gap_counts[i], streams[i].time[-1] < end))
-    ordered = [streams[i] for i in order]
+    there = [stream for stream in streams if stream.time.size]
+    begin = max(stream.time[0] for stream in there)
+    end = common_end(np.array([stream.time[-1] for stream in there]))
+    ordered = [streams[i] for i in whole.order]
     base: Array = ordered[0].time[(ordered[0].time >= begin) & (ordered[0].time <= end)]
-    nominal = usual_interval(base)
-    empty = _empty_until(base, end, nominal)
+    nominal = float(whole.intervals[whole.order[0]])
+    empty = _empty_until(base, begin, end, nominal)
     for stream in ordered[1:]:
         parts = [base]
         for first, last in empty:
@@ -137,31 +172,30 @@ def _common_time(streams: tuple[ImuStream, ...], gap_counts: Sequence[int]) -> A
             parts.append(stream.time[inside])
         if any(map(len, parts[1:])):
             base = np.sort(np.concatenate(parts))
-            empty = _empty_until(base, end, nominal)
+            empty = _empty_until(base, begin, end, nominal)
     return base
 
 
-def _empty_until(base: Array, end: float, nominal: float) -> list[tuple[float, float]]:
-    """Return the gaps of a clock, and what it lacks until the end."""
-    return [*gaps_of(base), *([(float(base[-1]), end + nominal)] if end - base[-1] > GAP * nominal else [])]
+def _empty_until(base: Array, begin: float, end: float, nominal: float) -> list[tuple[float, float]]:
+    """Return the gaps of a clock, and what it lacks until the end: all, from the beginning, if it has ended before."""
+    if not base.size:
+        return [(begin - nominal, end + nominal)]
+    return [*gaps_of(base, nominal), *([(float(base[-1]), end + nominal)] if end - base[-1] > GAP * nominal else [])]
 
 
-def _resample(stamps: Array, values: Array, time: Array) -> Array:
-    """Return what was measured over the intervals of `time`; a sample is constant within its own."""
+def _resample(stream: ImuStream, time: Array, usual: float) -> Array:
+    """Return what was measured over the intervals of `time`, (T, 6); a sample is constant within its own."""
     from polyins.kernels.resample import resample
 
+    stamps, values = np.ascontiguousarray(stream.time), np.hstack([stream.dtheta, stream.dvel])
     out = np.empty((len(time), values.shape[1]))
-    before, begin = stamps[0] - usual_interval(stamps), time[0] - usual_interval(time)
-    resample(np.ascontiguousarray(stamps), values, before, np.ascontiguousarray(time), begin, out)
+    resample(stamps, values, stamps[0] - usual, np.ascontiguousarray(time), time[0] - usual_interval(time), out)
     return out
 
 
-def gaps_of(stamps: Array, usual: float | None = None) -> list[tuple[float, float]]:
-    """Return where stamps are missing: the last before and the first after each gap, s.
-
-    `usual`: the usual interval, where `stamps` are a part of more.
-    """
-    where = np.flatnonzero(np.diff(stamps) > GAP * (usual_interval(stamps) if usual is None else usual))
+def gaps_of(stamps: Array, usual: float) -> list[tuple[float, float]]:
+    """Return where stamps are missing: the last before and the first after each gap, s; `usual`: their interval, s."""
+    where = np.flatnonzero(np.diff(stamps) > GAP * usual)
     return [(float(stamps[k]), float(stamps[k + 1])) for k in where]
 
 

@@ -1,8 +1,8 @@
-"""The Parquet file of one IMU, read stretch by stretch: what is held does not grow with the file."""
+"""The file of one IMU, read in order: what is held does not grow with the file."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,25 +10,22 @@ import numpy as np
 
 from polyins.checks import stream_checks
 from polyins.checks.faults import without_faults
-from polyins.config import ImuEntry
+from polyins.config import ImuColumns, ImuEntry
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats import table
-from polyins.formats.arrow_arrays import to_numpy
-from polyins.formats.columns import parquet_places
+from polyins.formats import columns, kf_gins, table
+from polyins.formats.columns import Column
+from polyins.formats.recognize import imu_format
 from polyins.formats.rows import ImuRows, Source
-from polyins.model.recording import USUAL_OF, Array, ImuStream, usual_interval
+from polyins.model.recording import Array, ImuStream, usual_interval
 from polyins.prepare.timesync import gaps_of
 from polyins.reading.imu_stream import in_array_axes
 
-ROWS = 16_384
-"""read at once"""
-BUFFER_BYTES = 1 << 18
-"""of a column; without it a whole row group would be held"""
+Pieces = Callable[[str, Sequence[Column]], Iterator[tuple[Source, list[Array]]]]
 
 
 @dataclass(frozen=True)
-class Extent:
+class StreamExtent:
     """What the stamps of a whole file say, on the recording's clock."""
 
     first: float
@@ -38,41 +35,47 @@ class Extent:
     rows: int
     gaps: tuple[tuple[float, float], ...]
     """the last stamp before and the first after each"""
+    interval: float
+    """the usual one, s"""
 
 
 class ImuFile:
-    """Increments of one IMU in array axes, from a Parquet file with stamps, in the order of time."""
+    """Increments of one IMU in array axes, from a file in the order of time; raises InputError for any other format."""
 
     def __init__(self, entry: ImuEntry) -> None:
         self.entry = entry
-        self.columns = entry.columns or table.written_imu_columns()
         self.source = Source(str(find(entry.file)))
-        self.places = parquet_places(self.source.path, table.imu_cells(self.columns))
+        self.columns, self._pieces = _format(entry)
+        self._cells = table.imu_cells(self.columns, entry.rate_hz)
 
-    def extent(self) -> Extent:
+    def extent(self) -> StreamExtent:
         """Read the stamps alone; raise InputError where they do not increase."""
-        first, last, rows, gaps, usual = np.nan, np.nan, 0, [], np.nan
-        for time in self._stamps():
+        first, last, rows, usual = np.nan, np.nan, 0, np.nan
+        gaps: list[tuple[float, float]] = []
+        for source, time in self._stamps():
             if not rows:
-                first, usual = time[0], usual_interval(time)
+                first, usual = time[0], usual_interval(time) if len(time) > 1 else np.nan
             known = time if not rows else np.concatenate([[last], time])
-            self._check(known, max(rows - 1, 0))
+            row = (0 if source.first_line else rows) - (len(known) - len(time))
+            stream_checks.check_finite(source, {"time": known}, row)
+            stream_checks.check_order(source, known, first_row=row)
             gaps += gaps_of(known, usual)
             rows, last = rows + len(time), time[-1]
         if rows < 2:
             raise InputError(f"{self.source.path}: {rows} row(s); expected at least 2")
-        return Extent(float(first), float(last), rows, tuple(gaps))
+        return StreamExtent(float(first), float(last), rows, tuple(gaps), float(usual))
 
     def stretches(self) -> Iterator[ImuStream]:
-        """Give the rows batch by batch; raise InputError for values that are not numbers."""
+        """Give the rows piece by piece; raise InputError for values that are not numbers."""
         before: list[Array] | None = None
         done = 0
-        for values in self._batches(self.places):
+        for source, values in self._pieces(self.source.path, self._cells):
+            known = 0 if before is None else 1
             whole = values if before is None else [np.concatenate([a, b]) for a, b in zip(before, values, strict=True)]
-            rows = table.imu_rows(self.source, whole, self.columns)
-            skipped = 0 if before is None else 1
-            fresh = ImuRows(self.source, rows.time[skipped:], rows.dtheta[skipped:], rows.dvel[skipped:])
-            stream_checks.check_finite(self.source, {"gyro": fresh.dtheta, "accel": fresh.dvel}, done)
+            rows = table.imu_rows(source, whole, self.columns, self.entry.rate_hz, done - known)
+            fresh = ImuRows(source, rows.time[known:], rows.dtheta[known:], rows.dvel[known:])
+            row = 0 if source.first_line else done
+            stream_checks.check_finite(source, {"gyro": fresh.dtheta, "accel": fresh.dvel}, row)
             for text in without_faults(fresh, self.entry.name, self.entry.clock_offset_s)[1]:
                 raise InputError(
                     text.replace("left out", "of a recording this long nothing is left out; expected none")
@@ -81,30 +84,37 @@ class ImuFile:
             before = [column[-1:] for column in values]
             done += len(fresh.time)
 
-    def _check(self, time: Array, row: int) -> None:
-        stream_checks.check_finite(self.source, {"time": time}, row)
-        stream_checks.check_order(self.source, time, first_row=row)
-
-    def _stamps(self) -> Iterator[Array]:
-        assert self.columns.time is not None
-        unit = table.SECONDS[self.columns.time.unit]
-        for (stamps,) in self._batches(self.places[-1:]):
-            yield stamps * unit + self.entry.clock_offset_s
-
-    def _batches(self, names: list[str]) -> Iterator[list[Array]]:
-        """Give columns, the first time as many rows as tell the usual interval."""
-        from pyarrow import ArrowException, chunked_array, float64, parquet
-
-        try:
-            file = parquet.ParquetFile(self.source.path, buffer_size=BUFFER_BYTES, pre_buffer=False)
-            for batch in file.iter_batches(max(ROWS, USUAL_OF + 1), columns=names, use_threads=False):
-                yield [to_numpy(chunked_array([batch.column(name).cast(float64(), safe=False)])) for name in names]
-        except (ArrowException, OSError) as error:
-            raise InputError(f"{self.source.path}: cannot be read ({str(error).splitlines()[0]})") from error
+    def _stamps(self) -> Iterator[tuple[Source, Array]]:
+        done, rate = 0, self.entry.rate_hz
+        unit = 1.0 if self.columns.time is None else table.SECONDS[self.columns.time.unit]
+        for source, values in self._pieces(self.source.path, self._cells[-1:]):
+            own = values[0] * unit if rate is None else np.arange(done, done + len(values[0])) / rate
+            yield source, own + self.entry.clock_offset_s
+            done += len(values[0])
 
 
-class Reel:
-    """A stream that is wound on: `until` gives a stretch of it, the next one overlapping it."""
+def can_be_read_in_order(entry: ImuEntry) -> bool:
+    """Whether a file has a format whose rows do not depend on one another, and is packed only where it is text."""
+    if _kind(entry) == "xsens-dot":
+        return False
+    parquet = columns.is_parquet(entry.file)
+    return not (parquet and find(entry.file).suffix == ".gz")
+
+
+def _kind(entry: ImuEntry) -> str:
+    if entry.format == "auto":
+        return "table" if entry.columns else imu_format(entry.file)
+    return entry.format
+
+
+def _format(entry: ImuEntry) -> tuple[ImuColumns, Pieces]:
+    if _kind(entry) == "table":
+        return entry.columns or table.written_imu_columns(), columns.read_in_order
+    return kf_gins.columns_of(entry.file, rates=_kind(entry) == "wheel-ins"), kf_gins.read_in_order
+
+
+class StretchReader:
+    """A stream that is read on: `until` gives a stretch of it, the next one overlapping it."""
 
     def __init__(self, file: ImuFile) -> None:
         self._ahead: Iterator[ImuStream] = file.stretches()
@@ -112,7 +122,7 @@ class Reel:
 
     def until(self, end: float, keep_from: float) -> ImuStream:
         """Return what is held, up to the first stamp after `end` at least, then let go what is before `keep_from`."""
-        while self._held is None or self._held.time[-1] <= end:
+        while self._held is None or not self._held.time.size or self._held.time[-1] <= end:
             more = next(self._ahead, None)
             if more is None:
                 break

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from polyins.evaluation.summary import Document
 from polyins.files import whole
-from polyins.model.recording import Recording
-from polyins.model.solution import Solution
 from polyins.report.drift_curves import drift_figure
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
 from polyins.report.figure import Figure, as_script
@@ -54,18 +52,9 @@ NO_BUTTONS = ("sendChartToCloud", "select2d", "lasso2d")
 SETTINGS = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": NO_BUTTONS}
 
 
-def write_report(
-    path: Path,
-    runs: Mapping[str, tuple[Solution, Document]],
-    recording: Recording,
-    comparison: Document | None = None,
-) -> None:
-    """Write the report of `runs`, name to solution and `run` document, to `path`.
-
-    With the `compare` document the table shows its figures (of single IMUs those over all) and ratios. Raises
-    InputError if the recording's reference cannot be compared with.
-    """
-    scene = Scene.of(runs, recording, comparison)
+def write_report(path: Path, scene: Scene, comparison: Document | None = None) -> None:
+    """Write the report of a scene to `path`; with the `compare` document the table shows its figures and ratios."""
+    recording = scene.recording
     text = _template().render(
         title=recording.name,
         version=__version__,
@@ -75,7 +64,7 @@ def write_report(
         sections=_sections(scene),
         config=recording.config_text,
         plotly=_plotly_script(),
-        pooled=next((name for name in runs if comparison and "each" in comparison["methods"][name]), None),
+        pooled=next((run.name for run in scene.runs if comparison and "each" in comparison["methods"][run.name]), None),
     )
     with whole(path) as beside:
         beside.write_text(text, encoding="utf-8")

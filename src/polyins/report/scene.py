@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.evaluation.errors import Errors, compare_to_reference
+from polyins.evaluation.outages import Interval
 from polyins.evaluation.summary import Document, on_wheels
 from polyins.model.attitude import rotation_matrices
 from polyins.model.geodesy import metres_per_unit
-from polyins.model.recording import Recording
+from polyins.model.recording import Recording, usual_interval
 from polyins.model.solution import Solution
-from polyins.prepare.timesync import GAP
+from polyins.prepare import timesync
 from polyins.report.palette import OUTAGE, SILENCE, method_styles
 
 Array = NDArray[np.float64]
@@ -70,21 +71,34 @@ class Scene:
 
     recording: Recording
     runs: tuple[Run, ...]
+    gaps: Mapping[str, Sequence[Interval]]
+    """where an IMU has no data, by its name, s, s"""
 
     @classmethod
     def of(
-        cls, runs: Mapping[str, tuple[Solution, Document]], recording: Recording, comparison: Document | None
+        cls,
+        runs: Mapping[str, tuple[Solution, Document]],
+        recording: Recording,
+        comparison: Document | None = None,
+        errors: Mapping[str, Errors | None] | None = None,
+        gaps: Mapping[str, Sequence[Interval]] | None = None,
     ) -> Scene:
-        """Compare each run with the recording's reference; a comparison's figures stand in for those of one IMU."""
+        """Lay out runs, by name solution and figures; a comparison's figures stand in for those of one IMU.
+
+        `errors`, of runs by name, and `gaps`, of IMUs by name, are found from the recording unless given. Raises
+        InputError if its reference cannot be compared with.
+        """
         figures = comparison["methods"] if comparison else {}
+        if errors is None:
+            errors = {name: _errors(solution, recording) for name, (solution, _) in runs.items()}
         styles = method_styles(list(runs))
-        return cls(
-            recording,
-            tuple(
-                Run(name, solution, figures.get(name, summary), _errors(solution, recording), *style)
-                for (name, (solution, summary)), style in zip(runs.items(), styles, strict=True)
-            ),
+        made = tuple(
+            Run(name, solution, figures.get(name, summary), errors[name], *style)
+            for (name, (solution, summary)), style in zip(runs.items(), styles, strict=True)
         )
+        if gaps is None:
+            gaps = dict(zip((imu.name for imu in recording.rig.imus), gaps_of(recording), strict=True))
+        return cls(recording, made, gaps)
 
     @property
     def start(self) -> float:
@@ -110,14 +124,11 @@ class Scene:
         """What figures over time mark: the outages, and gaps in the data of IMUs that navigate."""
         navigators = {name for run in self.runs for name in run.solution.imu_names}
         found = [Shade(begin, end, OUTAGE, "") for begin, end in self.outages]
-        for stream in self.recording.imus:
-            step = np.diff(stream.time)
-            if stream.name not in navigators or step.size == 0:
-                continue
-            for k in np.flatnonzero(step > max(LEAST_SILENCE, GAP * float(np.median(step)))):
-                begin, end = (float(time) - self.start for time in stream.time[[k, k + 1]])
-                if end > 0.0 and begin < self.duration:
-                    found.append(Shade(begin, end, SILENCE, escape(stream.name)))
+        for name in navigators & self.gaps.keys():
+            for first, last in self.gaps[name]:
+                begin, end = first - self.start, last - self.start
+                if last - first > LEAST_SILENCE and end > 0.0 and begin < self.duration:
+                    found.append(Shade(begin, end, SILENCE, escape(name)))
         return found
 
     def at_reference_point(self, run: Run) -> Array:
@@ -137,3 +148,8 @@ class Scene:
 
 def _errors(solution: Solution, recording: Recording) -> Errors | None:
     return None if recording.reference is None else compare_to_reference(solution, recording.reference)
+
+
+def gaps_of(recording: Recording) -> list[list[Interval]]:
+    """Return where each IMU of a recording has no data, s, s."""
+    return [timesync.gaps_of(stream.time, usual_interval(stream.time)) for stream in recording.imus]

@@ -283,7 +283,7 @@ def _settings(recording: Recording) -> dict[str, Any]:
 
 def _write_report(path: Path, trial: Trial, solutions: Mapping[str, Solution]) -> None:
     """Draw a trial's runs; the table shows the figures of the document."""
-    from polyins.report import write_report
+    from polyins.report import Scene, write_report
 
     runs = {}
     for name, solution in solutions.items():
@@ -292,4 +292,4 @@ def _write_report(path: Path, trial: Trial, solutions: Mapping[str, Solution]) -
             summary["drift"][key] = scores[key]
         summary["reference"]["heading_rmse_deg"] = scores["heading_rmse_deg"]
         runs[name] = (solution, summary)
-    write_report(path, runs, trial.recording)
+    write_report(path, Scene.of(runs, trial.recording))

@@ -1,4 +1,4 @@
-"""The files that a command leaves in its folder; each is whole or absent."""
+"""The files that a command leaves in its folder beside its solutions; each is whole or absent."""
 
 from __future__ import annotations
 
@@ -8,56 +8,62 @@ from typing import Any
 
 from polyins.files import write_bytes
 from polyins.formats.documents import write_document
-from polyins.formats.solution_files import write_solution
 from polyins.model.recording import Recording
-from polyins.model.solution import Solution
+from polyins.reading.long_recording import LongRecording
 from polyins.tools.comparison import Comparison
+from polyins.tools.navigation import Outcome, head
 
 Document = Mapping[str, Any]
 
 
-def write_run(folder: Path, recording: Recording, solution: Solution, summary: Document, report: bool = True) -> None:
-    """Write solution, summary, configuration and report of one run."""
-    write_solution(solution, folder)
-    write_summary(folder, recording, summary)
+def write_run(folder: Path, recording: Recording | LongRecording, outcome: Outcome, report: bool = True) -> None:
+    """Write summary, configuration and report of one run."""
+    _write_summary(folder, head(recording), outcome.summary)
     if report:
-        from polyins.report.page import write_report
-
-        write_report(folder / "report.html", {solution.method: (solution, dict(summary))}, recording)
+        _write_report(folder, recording, {outcome.solution.method: outcome})
 
 
-def write_summary(folder: Path, recording: Recording, summary: Document) -> None:
-    """Write summary and configuration of a run, and take away the report of an earlier one."""
+def write_comparison(
+    folder: Path, recording: Recording | LongRecording, result: Comparison, report: bool = True
+) -> None:
+    """Write the summary of each method into its folder, and what compares them.
+
+    Below `single` (with wheels `wheel-ins`), which has the figures over all, each IMU has a folder of its name.
+    """
+    summaries = result.document["methods"]
+    for name in result.outcomes:
+        write_document(folder / name / "summary.json", summaries[name])
+        for imu, summary in zip(result.each, summaries[name].get("each", ()), strict=False):
+            write_document(folder / name / imu / "summary.json", summary)
+    _write_summary(folder, head(recording), result.document)
+    if report:
+        runs = {name: Outcome(one.solution, one.errors, summaries[name]) for name, one in result.outcomes.items()}
+        _write_report(folder, recording, runs, result.document)
+
+
+def _write_summary(folder: Path, recording: Recording, summary: Document) -> None:
+    """Write summary and configuration, and take away the report of an earlier run."""
     write_document(folder / "summary.json", summary)
-    _write_config(folder, recording)
+    write_bytes(folder / "config.yaml", recording.config_text.encode())
     (folder / "report.html").unlink(missing_ok=True)
 
 
-def write_comparison(folder: Path, recording: Recording, result: Comparison, report: bool = True) -> None:
-    """Write a folder per method and what compares them.
+def _write_report(
+    folder: Path,
+    recording: Recording | LongRecording,
+    runs: Mapping[str, Outcome],
+    comparison: dict[str, Any] | None = None,
+) -> None:
+    from polyins.report.page import write_report
+    from polyins.report.scene import Scene, gaps_of
 
-    Below `single` (with wheels `wheel-ins`), which holds the first IMU's solution and the figures over all, each IMU
-    has a folder of its name.
-    """
-    summaries = result.document["methods"]
-    alone = "wheel-ins" if recording.rig.has_wheels else "single"
-    for name, solution in result.solutions.items():
-        if name != alone:
-            write_solution(solution, folder / name)
-            write_document(folder / name / "summary.json", summaries[name])
-    if alone in result.solutions:
-        write_solution(result.solutions[alone], folder / alone)
-        write_document(folder / alone / "summary.json", summaries[alone])
-        for (name, solution), summary in zip(result.each.items(), summaries[alone]["each"], strict=True):
-            write_solution(solution, folder / alone / name)
-            write_document(folder / alone / name / "summary.json", summary)
-    write_summary(folder, recording, result.document)
-    if report:
-        from polyins.report.page import write_report
-
-        runs = {name: (solution, summaries[name]) for name, solution in result.solutions.items()}
-        write_report(folder / "report.html", runs, recording, result.document)
-
-
-def _write_config(folder: Path, recording: Recording) -> None:
-    write_bytes(folder / "config.yaml", recording.config_text.encode())
+    known = head(recording)
+    gaps = gaps_of(known) if isinstance(recording, Recording) else recording.gaps
+    scene = Scene.of(
+        {name: (one.solution, one.summary) for name, one in runs.items()},
+        known,
+        comparison,
+        {name: one.errors for name, one in runs.items()},
+        dict(zip((imu.name for imu in known.rig.imus), gaps, strict=True)),
+    )
+    write_report(folder / "report.html", scene, comparison)

@@ -1,0 +1,185 @@
+"""Recordings longer than memory: their IMUs stay in their files and are aligned stretch by stretch.
+
+What looks at the whole recording elsewhere looks at its beginning here: units, axes, the search for a start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from polyins.checks import faults, stream_checks, wheel_checks
+from polyins.config import Config
+from polyins.config.yaml_document import Document
+from polyins.errors import InputError
+from polyins.files import find_named
+from polyins.formats.columns import is_parquet
+from polyins.formats.rows import ImuRows
+from polyins.model.recording import ImuStream, Recording
+from polyins.prepare import timesync
+from polyins.prepare.timesync import Aligned, Whole
+from polyins.reading import loading
+from polyins.reading.imu_file import ImuFile, StreamExtent, StretchReader, can_be_read_in_order
+from polyins.reading.imu_stream import as_mounted
+
+STRETCH_S = 60.0
+HEAD_S = 300.0
+"""the beginning, from which units and axes are checked and the start is found"""
+MARGIN_S = 3.0
+"""by which the stretches overlap while they are aligned"""
+LEAST_FIRST_S = 10.0
+"""of the first stretch, whose epochs tell the rate"""
+LARGE = 20_000_000
+"""rows of all IMUs together: with so many a recording takes gigabytes when it is in memory"""
+BYTES_OF_ROW = 40
+"""of a file, seldom less: tells without reading it that it cannot have many rows"""
+
+
+@dataclass(frozen=True)
+class LongRecording:
+    """A recording whose IMUs stay in their files."""
+
+    head: Recording
+    """with the beginning of the IMUs' streams only"""
+    files: tuple[ImuFile, ...]
+    extents: tuple[StreamExtent, ...]
+    span: tuple[float, float]
+    """that all IMUs cover, s"""
+
+    @property
+    def rows(self) -> int:
+        """Rows of all IMUs."""
+        return sum(extent.rows for extent in self.extents)
+
+    @property
+    def gaps(self) -> list[list[tuple[float, float]]]:
+        """Where each IMU has no data within the span, s, s, its end included if others go on without it."""
+        (begin, end), found = self.span, []
+        for extent in self.extents:
+            known = [gap for gap in extent.gaps if gap[1] > begin and gap[0] < end]
+            found.append(known + ([(extent.last, end)] if end - extent.last > timesync.LATE else []))
+        return found
+
+    def subset(self, indices: Sequence[int]) -> LongRecording:
+        """Return the recording with just the IMUs of those indices."""
+        files, extents = tuple(self.files[i] for i in indices), tuple(self.extents[i] for i in indices)
+        return replace(self, head=self.head.subset(indices), files=files, extents=extents, span=_span(files, extents))
+
+    def beginning(self) -> Aligned:
+        """Return the beginning of the IMUs on one time base."""
+        return timesync.align(self.head.imus, self._bridge, self._whole)
+
+    def stretches(self, begin: float, end: float, stretch_s: float = STRETCH_S) -> Iterator[Aligned]:
+        """Give the epochs from begin to end, s, aligned stretch by stretch."""
+        readers = [StretchReader(file) for file in self.files]
+        before = -np.inf
+        for border in self._borders(end, stretch_s):
+            if begin < border < min(begin + LEAST_FIRST_S, end):
+                continue
+            streams = tuple(reader.until(border + MARGIN_S, border - MARGIN_S) for reader in readers)
+            if border > begin:
+                aligned = timesync.align(streams, self._bridge, self._whole)
+                yield aligned.between(max(np.nextafter(before, np.inf), begin), border)
+            before = border
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Say which IMUs begin late or have gaps."""
+        gaps = zip(self.head.rig.imus, self.gaps, strict=True)
+        late = timesync.late_warnings(self.head.imus)
+        return (*late, *(timesync.gap_warning(imu.name, known) for imu, known in gaps if known))
+
+    @property
+    def _bridge(self) -> bool:
+        return not self.head.rig.has_wheels
+
+    @property
+    def _whole(self) -> Whole:
+        of = self.extents
+        ends, intervals = np.array([one.last for one in of]), np.array([one.interval for one in of])
+        return Whole(tuple(len(one.gaps) for one in of), ends, intervals)
+
+    def _borders(self, end: float, stretch_s: float) -> list[float]:
+        """Return where stretches end: not near a gap or an end of any IMU, whose both sides lie within one stretch."""
+        gaps = sorted([gap for one in self.extents for gap in (*one.gaps, (one.last, one.last))])
+        borders = []
+        border = self.span[0] + max(stretch_s, 4.0 * MARGIN_S)
+        while border < end - 2.0 * MARGIN_S:
+            for begin, over in gaps:
+                if begin - 2.0 * MARGIN_S < border < over + 2.0 * MARGIN_S:
+                    border = over + 2.0 * MARGIN_S
+            borders.append(border)
+            border += stretch_s
+        return [*(border for border in borders if border < end - 2.0 * MARGIN_S), end]
+
+
+def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecording | None:
+    """Open a recording that can be taken in stretches and has that many rows; None for any other.
+
+    It can unless a clock offset is estimated, a gyro's range leaves rows out, or the format repairs rows by others.
+    Raises InputError as `load` does.
+    """
+    config, document, warnings = settings
+    if not _can_be_streamed(config, document):
+        return None
+    if sum(_rows_at_most(entry.file) for entry in config.imus) < least_rows:
+        return None
+    files = tuple(ImuFile(entry) for entry in config.imus)
+    extents = tuple(file.extent() for file in files)
+    if sum(extent.rows for extent in extents) < least_rows:
+        return None
+    notes = wheel_checks.check_settings(config, document)
+    span = _span(files, extents)
+    streams = tuple(StretchReader(file).until(span[0] + HEAD_S, span[0]) for file in files)
+    for number in range(len(files)):
+        notes += _checked(files[number], streams[number], number, document)
+    faults.check_alive(streams)
+    imus = tuple(as_mounted(entry) for entry in config.imus)
+    head = loading.assemble(config, document, imus, streams, span)
+    warnings = (*warnings, *notes, *head.warnings)
+    return LongRecording(replace(head, warnings=warnings, config_text=loading.in_force(config)), files, extents, span)
+
+
+def _can_be_streamed(config: Config, document: Document) -> bool:
+    for index, entry in enumerate(config.imus):
+        with document.at(["imus", index, "file"]):
+            find_named(entry.file)
+    return not (config.gnss and config.gnss.time_offset) and all(
+        entry.time_offset is None
+        and entry.gyro_range_deg_s is None
+        and (entry.rate_hz or entry.columns is None or entry.columns.time is not None)
+        and can_be_read_in_order(entry)
+        for entry in config.imus
+    )
+
+
+def _rows_at_most(path: str) -> int:
+    found = find_named(path)
+    if found.suffix != ".gz" and is_parquet(found):
+        from pyarrow import ArrowException, parquet
+
+        try:
+            return int(parquet.read_metadata(found).num_rows)
+        except (ArrowException, OSError) as error:
+            raise InputError(f"{path}: is not a whole Parquet file ({str(error).splitlines()[0]})") from error
+    packed = 5 if found.suffix == ".gz" else 1
+    return packed * found.stat().st_size // BYTES_OF_ROW
+
+
+def _span(files: Sequence[ImuFile], extents: Sequence[StreamExtent]) -> tuple[float, float]:
+    ends = {file.entry.name: (extent.first, extent.last) for file, extent in zip(files, extents, strict=True)}
+    return stream_checks.check_common_span(ends)
+
+
+def _checked(file: ImuFile, stream: ImuStream, index: int, document: Document) -> tuple[str, ...]:
+    """Check the beginning of an IMU's data; what is looked at does not depend on the axes."""
+    gyro, accel, wheel = file.columns.gyro.unit, file.columns.accel.unit, file.entry.wheel
+    rows = ImuRows(file.source, stream.time, stream.dtheta, stream.dvel, gyro_unit=gyro, accel_unit=accel)
+    if wheel is not None:
+        return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, wheel.radius_m)
+    warnings = stream_checks.check_imu(rows)
+    place = document.place(["imus", index, "axes"])
+    stream_checks.check_upright(file.entry.name, place, file.entry.axes, stream.time, stream.dvel)
+    return warnings

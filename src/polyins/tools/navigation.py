@@ -1,0 +1,197 @@
+"""One method over a recording in memory or in its files: navigated, judged and written stretch by stretch.
+
+What the filter remembers lies in its state, so that a trajectory in stretches is that of the whole bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from polyins.errors import InputError
+from polyins.evaluation.errors import Errors
+from polyins.evaluation.figures import Figures
+from polyins.evaluation.summary import Document, document
+from polyins.formats.solution_files import SolutionWriter
+from polyins.model.methods import Method, find_method
+from polyins.model.recording import Recording
+from polyins.model.solution import Solution
+from polyins.navigate import batch
+from polyins.navigate.choice import Choice, choose
+from polyins.prepare import alignment
+from polyins.prepare.alignment import Start
+from polyins.prepare.timesync import Aligned
+from polyins.reading.long_recording import HEAD_S, STRETCH_S, LongRecording
+from polyins.report.decimation import kept_for_display
+
+SHOWN_EPOCHS = 20_000
+"""epochs of a long recording's solution that are kept for the report, at least"""
+SHOWN_LOGS = 2000
+"""rows of its log of IMU errors, likewise"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one method made of a recording."""
+
+    solution: Solution
+    """of a long recording the epochs that a picture needs"""
+    errors: Errors | None
+    """of those epochs"""
+    summary: Document
+    """the `run` document"""
+
+
+def head(recording: Recording | LongRecording) -> Recording:
+    """Return the recording without what lies in its files."""
+    return recording.head if isinstance(recording, LongRecording) else recording
+
+
+def run(
+    recording: Recording | LongRecording,
+    method: str = "enav-fusion",
+    *,
+    imu: int = 0,
+    folders: Mapping[Path, float | None] | None = None,
+    stretch_s: float = STRETCH_S,
+    progress: Callable[[float], None] | None = None,
+) -> Outcome:
+    """Navigate with one method, and write the solution into `folders`, each with so many rows a second, or all.
+
+    Raises InputError as `batch.run` does, and for a row that turns out wrong on the way.
+    """
+    known = head(recording)
+    figures = Figures(known.reference, known.outages, known.geodetic)
+    shown: list[tuple[Solution, Errors | None]] = []
+    with ExitStack() as stack:
+        writers = [stack.enter_context(SolutionWriter(*folder)) for folder in (folders or {}).items()]
+        for part in _parts(recording, find_method(method), imu, stretch_s, progress):
+            errors = figures.add(part)
+            for writer in writers:
+                writer.add(part)
+            if isinstance(recording, LongRecording):
+                share = (part.time[-1] - part.time[0]) / (recording.span[1] - recording.span[0])
+                part, errors = _thinned(part, errors, float(share))
+            shown.append((part, errors))
+        solution = Solution.joined([part for part, _ in shown])
+        for writer in writers:
+            writer.finish(solution)
+    found = [errors for _, errors in shown if errors is not None]
+    return Outcome(solution, Errors.joined(found) if found else None, document(solution, figures))
+
+
+def _parts(
+    recording: Recording | LongRecording,
+    row: Method,
+    imu: int,
+    stretch_s: float,
+    progress: Callable[[float], None] | None,
+) -> Iterator[Solution]:
+    if isinstance(recording, Recording):
+        yield batch.run(recording, row.name, imu=imu, progress=progress)
+        return
+    choice = choose(row, recording.head.rig, imu)
+    recording, choice = recording.subset(choice.all), choice.renumbered()
+    start, end = _extent(recording, row)
+    stretches = recording.stretches(start.time, end, stretch_s)
+    run: batch.Prepared | None = None
+    silent = _Silences(recording.head, choice)
+    for stretch in _whole_logs(stretches):
+        silent.add(stretch)
+        run = _laid_out(row, choice, recording, stretch, start) if run is None else run.at(stretch)
+        part = batch.navigate(run)
+        if progress:
+            progress(float((stretch.time[-1] - start.time) / (end - start.time)))
+        warnings = (*recording.head.warnings, *recording.warnings)
+        yield replace(part, warnings=warnings, faults=silent.faults())
+
+
+def _extent(recording: LongRecording, row: Method) -> tuple[Start, float]:
+    """Find the start in the beginning; returns the end of the run as well, s."""
+    known, aligned = recording.head, recording.beginning()
+    wanted, (first, last) = known.start.time, recording.span
+    if wanted is not None and wanted > aligned.time[-1] - alignment.LEAST_LEFT:
+        raise InputError(
+            f"start: time {wanted:.3f} s; of a recording this long expected in its first {HEAD_S:g} s,"
+            f" {first:.3f} to {aligned.time[-1]:.3f} s"
+        )
+    return batch.start_of(row, known, aligned), last if known.start.end_time is None else known.start.end_time
+
+
+def _laid_out(row: Method, choice: Choice, recording: LongRecording, first: Aligned, start: Start) -> batch.Prepared:
+    known = recording.head
+    # the data of the beginning are not to be held until the end
+    empty = tuple(replace(stream, time=stream.time[:0]) for stream in known.imus)
+    return batch.lay_out(row, choice, replace(known, imus=empty), first, start, gaps=any(recording.gaps))
+
+
+class _Silences:
+    """The epochs in which IMUs have no data, and their neighbours, from which it is told what became of them."""
+
+    def __init__(self, recording: Recording, choice: Choice) -> None:
+        self._recording, self._choice = recording, choice
+        self._seen: list[Aligned] = []
+
+    def add(self, stretch: Aligned) -> None:
+        some = np.asarray(stretch.missing.any(axis=1))
+        if self._recording.rig.has_wheels and some.any():
+            near = np.convolve(some, [1, 1, 1], "same") > 0
+            self._seen.append(replace(stretch, time=stretch.time[near], missing=stretch.missing[near]))
+
+    def faults(self) -> tuple[str, ...]:
+        if not self._seen:
+            return ()
+        time, first = np.unique(np.concatenate([part.time for part in self._seen]), return_index=True)
+        missing = np.concatenate([part.missing for part in self._seen])[first]
+        return batch.silences(self._choice, self._recording, Aligned(time, np.empty(0), (), missing))
+
+
+def _whole_logs(stretches: Iterator[Aligned]) -> Iterator[Aligned]:
+    """Give stretches that begin with the last epoch of the one before and take whole steps of the log after it."""
+    held: Aligned | None = None
+    every = 1
+    for stretch in stretches:
+        if held is None:
+            every = batch.log_every(stretch)
+        held = stretch if held is None else _joined(held, stretch)
+        taken = (len(held.time) - 1) // every * every
+        if taken:
+            yield _part(held, slice(0, taken + 1))
+            held = _part(held, slice(taken, None))
+    if held is not None and len(held.time) > 1:
+        yield held
+
+
+def _joined(first: Aligned, second: Aligned) -> Aligned:
+    return Aligned(
+        np.concatenate([first.time, second.time]),
+        np.concatenate([first.increments, second.increments]),
+        (),
+        np.concatenate([first.missing, second.missing]),
+    )
+
+
+def _part(aligned: Aligned, part: slice) -> Aligned:
+    # copies: a view would hold the whole
+    return Aligned(aligned.time[part].copy(), aligned.increments[part].copy(), (), aligned.missing[part].copy())
+
+
+def _thinned(part: Solution, errors: Errors | None, share: float) -> tuple[Solution, Errors | None]:
+    """Keep of a part, which is that share of the whole, what a picture needs: the extremes of every curve."""
+    curves = [part.position, part.velocity]
+    if errors is not None:
+        spread = np.full(part.position.shape, np.nan)
+        spread[errors.covered] = errors.position
+        curves.append(spread)
+    rows = kept_for_display(np.hstack(curves), max(1, round(SHOWN_EPOCHS * share)))
+    every = max(1, round(len(part.imu_error_time) / max(SHOWN_LOGS * share, 1.0)))
+    logs = np.arange(len(part.imu_error_time))[::-every][::-1]
+    if errors is not None:
+        covered = errors.covered[rows]
+        of = (np.cumsum(errors.covered) - 1)[rows][covered]
+        errors = replace(errors.at(of), covered=covered)
+    return part.at(rows, logs), errors
