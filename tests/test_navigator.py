@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from polyins.model.solution import Solution
 from polyins.navigate import batch
 from polyins.navigate.navigator import Navigator
 from polyins.prepare.alignment import Start
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Scenario
 
 ARRAYS = ("single", "imu-fusion", "nav-fusion", "enav-fusion", "enav-fusion-shared-mechanization")
 WHEELS = ("wheel-ins", "body-ins", "triple-ins", "triple-ins/centralized")
@@ -205,3 +208,55 @@ def test_a_vehicle_begins_at_a_start_that_is_known() -> None:
     state, solution = navigator.state, batch.run(recording, "triple-ins")
     assert state is not None
     assert np.abs(state.position - solution.position[-1]).max() < 1.0
+
+
+def simulated() -> Recording:
+    """An array that stands for ten seconds and then drives, with fixes."""
+    return simulate(Scenario(duration_s=40.0, static_s=10.0, rate_hz=50.0, imus=Board(count=3), outages=(), seed=2))
+
+
+@pytest.mark.parametrize(
+    ("made", "method"),
+    [(simulated, "enav-fusion"), (simulated, "single"), (drive, "triple-ins"), (lambda: drive(gnss=True), "body-ins")],
+)
+def test_a_navigator_finds_the_start_of_a_batch_run(made: Callable[[], Recording], method: str) -> None:
+    recording = made()
+    taken = recording.start if method != "single" else replace(recording.start, heading=0.3, heading_from="value")
+    recording = replace(recording, start=taken)
+    navigator = Navigator(
+        recording.rig,
+        recording.start,
+        method=method,
+        options=recording.options,
+        geodetic=recording.geodetic,
+        fixes=recording.gnss is not None and recording.start.position is None,
+    )
+    assert navigator.state is None
+    for event in events(recording, lateness=-0.02):
+        feed(navigator, recording, event)
+    navigator.flush()
+    solution, state = batch.run(recording, method), navigator.state
+    assert navigator.start is not None
+    assert navigator.start.time == solution.start["time_s"]
+    assert state is not None
+    assert state.time == solution.time[-1]
+    np.testing.assert_array_equal(row(state), rows(solution)[-1])
+
+
+def test_a_navigator_without_a_start_says_what_it_waits_for_and_has_no_checkpoint(tmp_path: Path) -> None:
+    recording = simulated()
+    navigator = Navigator(recording.rig)
+    for k in range(200):
+        navigator.imu(
+            recording.imus[0].time[k],
+            np.array([one.dtheta[k] for one in recording.imus]),
+            np.array([one.dvel[k] for one in recording.imus]),
+        )
+    assert "until" in navigator.waits_for
+    for event in [e for e in events(recording) if e.imu >= 0 and recording.imus[0].time[199] < e.arrives < 12.0]:
+        feed(navigator, recording, event)
+    assert "GNSS" in navigator.waits_for
+    with pytest.raises(InputError, match=r"there is no start yet .*GNSS"):
+        navigator.save(tmp_path / "navigator.npz")
+    navigator.gnss(5.0, np.full(3, np.nan), np.ones(3))
+    assert navigator.counts["not finite"] == 1

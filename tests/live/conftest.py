@@ -6,9 +6,9 @@ import pytest
 
 from polyins.config.yaml_document import read_yaml, write_yaml
 from polyins.live import lines
-from polyins.live.events import Epoch
 from polyins.live.replay import Replay
 from polyins.model.recording import Recording
+from polyins.navigate.samples import Sample
 from polyins.reading import loading
 from polyins.simulation import files
 from polyins.simulation.run import simulate
@@ -28,14 +28,14 @@ def recording(drive: Path) -> Recording:
 
 
 @pytest.fixture(scope="session")
-def epochs(recording: Recording) -> list[Epoch]:
-    """All epochs in the order of their stamps, fixes in the outage withheld."""
-    return [epoch for chunk in Replay(recording).chunks() for epoch in chunk]
+def samples(recording: Recording) -> list[Sample]:
+    """All samples in the order of their stamps, fixes in the outage withheld."""
+    return [sample for chunk in Replay(recording).chunks() for sample in chunk]
 
 
 @pytest.fixture(scope="session")
-def datagrams(epochs: list[Epoch]) -> list[bytes]:
-    return [lines.write(epoch).encode() for epoch in epochs]
+def datagrams(samples: list[Sample]) -> list[bytes]:
+    return [lines.write(sample).encode() for sample in samples]
 
 
 @pytest.fixture(scope="session")

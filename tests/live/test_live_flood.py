@@ -10,12 +10,12 @@ import flooding
 import pytest
 
 from polyins.live.datagrams import Datagrams, lines_of
-from polyins.live.events import RefusedError
 from polyins.live.intake import Intake
 from polyins.live.session import Session
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
-from polyins.live.starter import Starter
+from polyins.live.source import RefusedError
+from polyins.navigate.starter import Starter
 from polyins.reading import loading
 
 JUNK = 20
@@ -44,7 +44,7 @@ def with_junk(datagrams: list[bytes]) -> Iterator[tuple[str, bytes]]:
         yield "good", datagram
 
 
-def navigated(config: Path, datagrams: list[tuple[str, bytes]], epochs: int) -> tuple[list[object], Counter[str]]:
+def navigated(config: Path, datagrams: list[tuple[str, bytes]], samples: int) -> tuple[list[object], Counter[str]]:
     """Take datagrams, the good ones at the time that their number says, and return the states and what was refused."""
     from polyins.navigate.navigator import Navigator
 
@@ -57,13 +57,13 @@ def navigated(config: Path, datagrams: list[tuple[str, bytes]], epochs: int) -> 
     good = 0
     for kind, datagram in datagrams:
         good += kind == "good"
-        for epoch in source.taken([datagram], good / epochs * SECONDS):
+        for sample in source.taken([datagram], good / samples * SECONDS):
             try:
-                session.take(intake.taken(epoch))
+                session.take(intake.taken(sample))
             except RefusedError as error:
                 source.counts[str(error)] += 1
-    for epoch in source.front.release(SECONDS):
-        session.take(epoch)
+    for sample in source.front.release(SECONDS):
+        session.take(sample)
     session.finish()
     source.socket.close()
     return kept.rows, session.refused() + source.counts

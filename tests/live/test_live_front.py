@@ -5,65 +5,65 @@ from collections import Counter
 import numpy as np
 
 from polyins.live import front
-from polyins.live.events import Epoch, ImuEpoch
+from polyins.navigate.samples import ImuSample, Sample
 
 
-def epoch(time: float) -> Epoch:
-    return ImuEpoch("imu1", time, np.zeros(3), np.zeros(3))
+def sample(time: float) -> Sample:
+    return ImuSample("imu1", time, np.zeros(3), np.zeros(3))
 
 
 def started(offset: float = 0.0) -> front.Front:
     """A front whose stamps are ahead of arrival by an offset."""
     one = front.Front(Counter())
     for k in range(front.FIRST_EPOCHS):
-        one.admit([epoch(k / 100 + offset)], k / 100)
+        one.admit([sample(k / 100 + offset)], k / 100)
     return one
 
 
 def test_nothing_is_lost_at_the_beginning():
     one, admitted = front.Front(Counter()), []
     for k in range(3 * front.FIRST_EPOCHS):
-        admitted += one.admit([epoch(k / 100 + 1e9)], k / 100)
+        admitted += one.admit([sample(k / 100 + 1e9)], k / 100)
     assert [e.time for e in admitted] == [k / 100 + 1e9 for k in range(3 * front.FIRST_EPOCHS)]
     assert not one.counts
 
 
 def test_a_few_epochs_wait_a_second_at_most():
     one = front.Front(Counter())
-    assert one.admit([epoch(5.0)], 100.0) == []
+    assert one.admit([sample(5.0)], 100.0) == []
     assert [e.time for e in one.admit([], 101.0)] == [5.0]
     one = front.Front(Counter())
-    one.admit([epoch(5.0)], 100.0)
+    one.admit([sample(5.0)], 100.0)
     assert [e.time for e in one.release(100.1)] == [5.0]
 
 
 def test_the_future_is_refused_even_where_it_comes_first():
     one = front.Front(Counter())
-    one.admit([epoch(1e6)] * 20, 0.0)
+    one.admit([sample(1e6)] * 20, 0.0)
     admitted = []
     for k in range(500):
-        admitted += one.admit([epoch(k / 100), epoch(k / 100 + 5.0 + k)][: 1 + k % 2], k / 100)
+        admitted += one.admit([sample(k / 100), sample(k / 100 + 5.0 + k)][: 1 + k % 2], k / 100)
     assert [e.time for e in admitted] == [k / 100 for k in range(500)]
     assert one.counts["future-stamped"] == 20 + 250
 
 
 def test_a_silence_moves_nothing():
     one = started()
-    assert len(one.admit([epoch(61.0)], 61.0)) == 1
-    assert one.admit([epoch(62.0)], 61.2) == []
-    assert len(one.admit([epoch(61.5)], 61.5)) == 1
+    assert len(one.admit([sample(61.0)], 61.0)) == 1
+    assert one.admit([sample(62.0)], 61.2) == []
+    assert len(one.admit([sample(61.5)], 61.5)) == 1
 
 
 def test_a_stall_on_the_way_moves_nothing():
     one = started()
-    burst = [epoch(1.0 + k / 100) for k in range(300)]
+    burst = [sample(1.0 + k / 100) for k in range(300)]
     assert len(one.admit(burst, 4.0)) == 300
-    assert len(one.admit([epoch(4.01)], 4.01)) == 1
+    assert len(one.admit([sample(4.01)], 4.01)) == 1
 
 
 def test_a_recording_sent_ten_times_faster_passes():
     one = front.Front(Counter())
-    admitted = [e for k in range(2000) for e in one.admit([epoch(k / 100)], k / 1000)]
+    admitted = [e for k in range(2000) for e in one.admit([sample(k / 100)], k / 1000)]
     assert len(admitted) == 2000
 
 
@@ -71,6 +71,6 @@ def test_a_stamp_slightly_ahead_does_not_open_the_gate_for_good():
     one, seconds = started(), 60
     for k in range(100 * seconds):
         now = 1.0 + k / 100
-        wrong = [epoch(now + 0.3)] if k % 100 == 0 else []
-        assert len(one.admit([epoch(now), *wrong], now)) == 1 + len(wrong)
-    assert one.admit([epoch(now + 1.0)], now) == []
+        wrong = [sample(now + 0.3)] if k % 100 == 0 else []
+        assert len(one.admit([sample(now), *wrong], now)) == 1 + len(wrong)
+    assert one.admit([sample(now + 1.0)], now) == []

@@ -8,12 +8,13 @@ import pytest
 
 from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
-from polyins.live.events import GnssEpoch, ImuEpoch, RefusedError
 from polyins.live.intake import Intake
+from polyins.live.source import RefusedError
+from polyins.navigate.samples import GnssFix, ImuSample
 from polyins.reading import loading
 
 IMU = {"name": "a", "axes": ["x", "-y", "-z"], "mount_deg": [0.0, 0.0, 90.0], "clock_offset_s": -2.5}
-FIX = GnssEpoch(7.0, np.array([0.8, 0.2, 500.0]), np.ones(3), np.ones(3), np.ones(3))
+FIX = GnssFix(7.0, np.array([0.8, 0.2, 500.0]), np.ones(3), np.ones(3), np.ones(3))
 
 
 def intake(folder: Path, **sections: Any) -> Intake:
@@ -24,20 +25,20 @@ def intake(folder: Path, **sections: Any) -> Intake:
     return Intake(config, recording.rig, recording.geodetic)
 
 
-def refusal(one: Intake, epoch: ImuEpoch | GnssEpoch) -> str:
+def refusal(one: Intake, sample: ImuSample | GnssFix) -> str:
     with pytest.raises(RefusedError) as refused:
-        one.taken(epoch)
+        one.taken(sample)
     return str(refused.value)
 
 
 def test_increments_are_turned_and_clocks_put_right(tmp_path: Path) -> None:
     one = intake(tmp_path)
-    turned = one.taken(ImuEpoch("a", 10.0, np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 9.8])))
+    turned = one.taken(ImuSample("a", 10.0, np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 9.8])))
     # x forward, y left, z up; then a quarter turn to the right
     np.testing.assert_allclose(turned.dtheta, [2.0, 1.0, -3.0], atol=1e-15)
     np.testing.assert_allclose(turned.dvel, [0.0, 0.0, -9.8], atol=1e-15)
     assert turned.time == 7.5
-    same = one.taken(ImuEpoch("b", 10.0, np.array([1.0, 2.0, 3.0]), np.zeros(3)))
+    same = one.taken(ImuSample("b", 10.0, np.array([1.0, 2.0, 3.0]), np.zeros(3)))
     np.testing.assert_array_equal(same.dtheta, [1.0, 2.0, 3.0])
     assert refusal(one, same._replace(imu="c")) == "unknown IMU"
 

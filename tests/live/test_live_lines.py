@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polyins.live import lines
-from polyins.live.events import GnssEpoch, ImuEpoch, RefusedError
+from polyins.live.source import RefusedError
+from polyins.navigate.samples import GnssFix, ImuSample
 
 SMALL = st.floats(-6.0, 6.0)
 VECTOR = st.tuples(SMALL, SMALL, SMALL).map(np.array)
@@ -16,15 +17,15 @@ TIME = st.floats(-1e9, 2e9)
 
 @given(time=TIME, dtheta=VECTOR, dvel=VECTOR)
 def test_increments_come_back_to_the_bit(time, dtheta, dvel):
-    back = lines.parse(lines.write(ImuEpoch("left 1", time, dtheta, dvel)).encode())
-    assert isinstance(back, ImuEpoch)
+    back = lines.parse(lines.write(ImuSample("left 1", time, dtheta, dvel)).encode())
+    assert isinstance(back, ImuSample)
     assert (back.imu, back.time) == ("left 1", time)
     np.testing.assert_array_equal(np.hstack([back.dtheta, back.dvel]), np.hstack([dtheta, dvel]))
 
 
 @given(time=TIME, position=VECTOR, std=SPREAD, velocity=st.none() | VECTOR)
 def test_fixes_on_a_plane_come_back_to_the_bit(time, position, std, velocity):
-    fix = GnssEpoch(time, position, std, velocity, None if velocity is None else std, geodetic=False)
+    fix = GnssFix(time, position, std, velocity, None if velocity is None else std, geodetic=False)
     back = lines.parse(lines.write(fix).encode())
     for sent, received in zip(fix, back, strict=True):
         np.testing.assert_array_equal(sent, received)
@@ -32,7 +33,7 @@ def test_fixes_on_a_plane_come_back_to_the_bit(time, position, std, velocity):
 
 def test_latitude_and_longitude_are_degrees():
     fix = lines.parse(b"polyins1,gnss,12.5,30.5,-114.25,20.0,1,2,3,4,5,6,0.1,0.2,0.3\r\n")
-    assert isinstance(fix, GnssEpoch)
+    assert isinstance(fix, GnssFix)
     assert fix.geodetic
     np.testing.assert_allclose(fix.position, [np.radians(30.5), np.radians(-114.25), 20.0], rtol=1e-15)
     np.testing.assert_array_equal(fix.position_std, [1, 2, 3])
@@ -41,9 +42,9 @@ def test_latitude_and_longitude_are_degrees():
 
 
 def test_rates_are_multiplied_by_their_interval():
-    epoch = lines.parse(b"polyins1,rates,imu1,7.0,0.02,1,2,3,-10,0,10")
-    np.testing.assert_allclose(epoch.dtheta, [0.02, 0.04, 0.06])
-    np.testing.assert_allclose(epoch.dvel, [-0.2, 0.0, 0.2])
+    sample = lines.parse(b"polyins1,rates,imu1,7.0,0.02,1,2,3,-10,0,10")
+    np.testing.assert_allclose(sample.dtheta, [0.02, 0.04, 0.06])
+    np.testing.assert_allclose(sample.dvel, [-0.2, 0.0, 0.2])
 
 
 GOOD = b"polyins1,increments,imu1,1.0,0,0,0,0,0,-0.1"
@@ -89,10 +90,10 @@ def test_refused_by_kind(line, kind):
 @given(st.binary(max_size=80) | st.builds(lambda a, b: GOOD[:a] + b + GOOD[a:], st.integers(0, 40), st.binary()))
 def test_no_bytes_do_more_than_be_refused(line):
     try:
-        epoch = lines.parse(line)
+        sample = lines.parse(line)
     except RefusedError:
         return
-    assert np.isfinite(epoch.time)
+    assert np.isfinite(sample.time)
 
 
 @pytest.mark.parametrize(
@@ -104,12 +105,12 @@ def test_no_bytes_do_more_than_be_refused(line):
     ],
 )
 def test_sensors_come_in_their_units_and_go_back_to_the_bit(line, value, std):
-    epoch = lines.parse(line)
-    assert (epoch.time, epoch.value) == (3.5, pytest.approx(value, rel=1e-15))
-    np.testing.assert_allclose(epoch.std, std, rtol=1e-15)
-    again = lines.parse(lines.write(epoch).encode())
-    assert again[:2] == epoch[:2]
-    assert again.value == pytest.approx(epoch.value, rel=1e-15)
+    sample = lines.parse(line)
+    assert (sample.time, sample.value) == (3.5, pytest.approx(value, rel=1e-15))
+    np.testing.assert_allclose(sample.std, std, rtol=1e-15)
+    again = lines.parse(lines.write(sample).encode())
+    assert again[:2] == sample[:2]
+    assert again.value == pytest.approx(sample.value, rel=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -20,15 +20,15 @@ import pytest
 
 from polyins.errors import InputError
 from polyins.live import gpsd
-from polyins.live.events import Epoch, GnssEpoch, RefusedError
-from polyins.live.source import Source
+from polyins.live.source import RefusedError, Source
 from polyins.live.sources import open_source
+from polyins.navigate.samples import GnssFix, Sample
 
 NAMES = ("imu1", "imu2", "imu3")
 FAR = 10.0  # s, within which anything happens
 
 
-def assert_same(received: list[Epoch], sent: list[Epoch]) -> None:
+def assert_same(received: list[Sample], sent: list[Sample]) -> None:
     assert len(received) == len(sent)
     for one, other in zip(received, sent, strict=True):
         for a, b in zip(one, other, strict=True):
@@ -36,9 +36,9 @@ def assert_same(received: list[Epoch], sent: list[Epoch]) -> None:
 
 
 @contextmanager
-def reading(source: Source) -> Iterator[list[Epoch]]:
+def reading(source: Source) -> Iterator[list[Sample]]:
     """Let a source read in a thread of its own; it has to stop in the end."""
-    received: list[Epoch] = []
+    received: list[Sample] = []
     thread = threading.Thread(target=lambda: [received.extend(chunk) for chunk in source.chunks()])
     thread.start()
     try:
@@ -56,10 +56,10 @@ def wait_for(done: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def test_udp(epochs: list[Epoch], datagrams: list[bytes]) -> None:
+def test_udp(samples: list[Sample], datagrams: list[bytes]) -> None:
     source = open_source("udp://127.0.0.1:0", NAMES)
     assert source.socket.getsockname()[0] == "127.0.0.1"
-    sent = epochs[:300]
+    sent = samples[:300]
     with reading(source) as received, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.connect(source.socket.getsockname())
         for line in datagrams[:150]:
@@ -95,7 +95,7 @@ def served(parts: list[bytes]) -> tuple[str, threading.Thread]:
     return f"{server.getsockname()[0]}:{server.getsockname()[1]}", thread
 
 
-def test_tcp_connects_again(epochs: list[Epoch], datagrams: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tcp_connects_again(samples: list[Sample], datagrams: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("polyins.live.streams.AGAIN", 0.05)
     text = b"".join(line + b"\r\n" for line in datagrams[:200])
     address, _ = served([text[:7777], text[7777:] + b"y" * 100_000 + b"\n" + datagrams[200]])
@@ -104,21 +104,21 @@ def test_tcp_connects_again(epochs: list[Epoch], datagrams: list[bytes], monkeyp
         wait_for(lambda: source.counts["connections lost"] >= 2)
     # the line that the loss cut in two is refused, unless it was cut at an end
     cut = text[:7777].count(b"\n")
-    assert_same(received, [*epochs[:cut], *epochs[cut + 1 : 201]])
+    assert_same(received, [*samples[:cut], *samples[cut + 1 : 201]])
     assert source.counts["malformed"] == 2
     assert source.counts["oversized"] == 1
 
 
-def test_standard_input_ends(datagrams: list[bytes], epochs: list[Epoch], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_standard_input_ends(datagrams: list[bytes], samples: list[Sample], monkeypatch: pytest.MonkeyPatch) -> None:
     reader, writer = os.pipe()
     monkeypatch.setattr(sys, "stdin", io.FileIO(reader))
     source = open_source("-", NAMES)
     os.write(writer, b"\n".join(datagrams[:50]))
     os.close(writer)
-    assert_same([epoch for chunk in source.chunks() for epoch in chunk], epochs[:50])
+    assert_same([sample for chunk in source.chunks() for sample in chunk], samples[:50])
 
 
-def test_serial_port(datagrams: list[bytes], epochs: list[Epoch]) -> None:
+def test_serial_port(datagrams: list[bytes], samples: list[Sample]) -> None:
     pytest.importorskip("serial")
     ours, theirs = os.openpty()
     source = open_source(f"serial://{os.ttyname(theirs)}?baud=460800", NAMES)
@@ -127,7 +127,7 @@ def test_serial_port(datagrams: list[bytes], epochs: list[Epoch]) -> None:
         for k in range(0, 120, 10):
             os.write(ours, b"".join(line + b"\n" for line in datagrams[k : k + 10]))
         wait_for(lambda: len(received) == 120)
-    assert_same(received, epochs[:120])
+    assert_same(received, samples[:120])
     os.close(ours)
     os.close(theirs)
 
@@ -230,7 +230,7 @@ def test_a_running_gpsd(tmp_path: Path) -> None:
             os.killpg(fake.pid, 15)
         fake.wait(FAR)
     for fix in received:
-        assert isinstance(fix, GnssEpoch)
+        assert isinstance(fix, GnssFix)
         second = fix.time % 60
         assert np.degrees(fix.position[0]) == pytest.approx(48.5 + 10.0 * second / 1852.0 / 60.0, abs=2e-7)
         assert np.degrees(fix.position[1]) == pytest.approx(-11.25)
@@ -248,11 +248,11 @@ def autopilot() -> tuple[object, Callable[[object], bytes]]:
     return common, lambda message: message.pack(link)
 
 
-def read_mavlink(datagrams: list[bytes], names: tuple[str, ...] = NAMES) -> tuple[list[Epoch], Counter[str]]:
+def read_mavlink(datagrams: list[bytes], names: tuple[str, ...] = NAMES) -> tuple[list[Sample], Counter[str]]:
     from polyins.live.mavlink import MavlinkReader
 
     reader, counts = MavlinkReader(names), Counter()
-    return [epoch for datagram in datagrams for epoch in reader(datagram, counts)], counts
+    return [sample for datagram in datagrams for sample in reader(datagram, counts)], counts
 
 
 def test_imus_of_an_autopilot() -> None:
@@ -265,11 +265,11 @@ def test_imus_of_an_autopilot() -> None:
             common.MAVLink_scaled_imu2_message(ms, 200, 0, -1000, 40, 50, 60, 0, 0, 0),
             common.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3),
         ]
-    epochs, counts = read_mavlink([packed(m) for m in messages])
-    assert [e.imu for e in epochs] == ["imu1", "imu2"] * 4
-    np.testing.assert_allclose([e.time for e in epochs[::2]], [1.02, 1.04, 1.06, 1.08])
-    np.testing.assert_allclose(epochs[0].dtheta, 0.02 * np.array([0.01, 0.02, 0.03]))
-    np.testing.assert_allclose(epochs[1].dvel, 0.02 * 9.80665 * np.array([0.2, 0.0, -1.0]))
+    samples, counts = read_mavlink([packed(m) for m in messages])
+    assert [e.imu for e in samples] == ["imu1", "imu2"] * 4
+    np.testing.assert_allclose([e.time for e in samples[::2]], [1.02, 1.04, 1.06, 1.08])
+    np.testing.assert_allclose(samples[0].dtheta, 0.02 * np.array([0.01, 0.02, 0.03]))
+    np.testing.assert_allclose(samples[1].dvel, 0.02 * 9.80665 * np.array([0.2, 0.0, -1.0]))
     assert not counts
 
 
@@ -280,10 +280,10 @@ def test_the_finest_message_of_an_imu_is_followed() -> None:
         for k in range(4)
     ]
     coarse = [common.MAVLink_raw_imu_message(10_000 * k, 9, 9, 9, 9, 9, 9, 0, 0, 0) for k in range(4)]
-    epochs, _ = read_mavlink([packed(m) for pair in zip(coarse, fine, strict=True) for m in pair])
-    assert len(epochs) == 3
-    for epoch in epochs:
-        np.testing.assert_allclose(epoch.dvel, 0.01 * np.array([0.1, 0.2, -9.8]), rtol=1e-6)
+    samples, _ = read_mavlink([packed(m) for pair in zip(coarse, fine, strict=True) for m in pair])
+    assert len(samples) == 3
+    for sample in samples:
+        np.testing.assert_allclose(sample.dvel, 0.01 * np.array([0.1, 0.2, -9.8]), rtol=1e-6)
 
 
 def test_gnss_of_an_autopilot() -> None:
@@ -313,10 +313,10 @@ def test_what_an_autopilot_should_not_send() -> None:
 
     damaged = bytearray(imu(1100))
     damaged[15] ^= 0xFF
-    epochs, counts = read_mavlink(
+    samples, counts = read_mavlink(
         [imu(1000), imu(1020), imu(1020), imu(1010), b"\xfd\x00", b"junk", bytes(damaged), imu(1040)]
     )
-    np.testing.assert_allclose([e.time for e in epochs], [1.02, 1.04])
+    np.testing.assert_allclose([e.time for e in samples], [1.02, 1.04])
     assert (counts["duplicated"], counts["reordered"]) == (1, 1)
     assert counts["malformed"] > 0
     _, counts = read_mavlink([imu(1000), imu(1020)], NAMES[:2])

@@ -1,1 +1,1 @@
-"""The engine on live data: sources of epochs, the session that navigates on them, sinks for what comes out."""
+"""The engine on live data: sources of samples, the session that navigates on them, sinks for what comes out."""

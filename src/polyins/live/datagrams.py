@@ -8,28 +8,28 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 from polyins.live import lines
-from polyins.live.events import Epoch, RefusedError
 from polyins.live.front import Front
 from polyins.live.receive import Receiver
-from polyins.live.source import POLL
+from polyins.live.source import POLL, RefusedError
+from polyins.navigate.samples import Sample
 
 LONGEST = 8192
 """bytes of a datagram"""
 BUFFER = 16 * 1024 * 1024
 """bytes that the system is asked to keep while the program is busy"""
 
-Parser = Callable[[bytes, Counter[str]], list[Epoch]]
+Parser = Callable[[bytes, Counter[str]], list[Sample]]
 
 
-def lines_of(datagram: bytes, counts: Counter[str]) -> list[Epoch]:
-    """Return the epochs of a datagram of lines; what is refused is counted by kind."""
-    epochs = []
+def lines_of(datagram: bytes, counts: Counter[str]) -> list[Sample]:
+    """Return the samples of a datagram of lines; what is refused is counted by kind."""
+    samples = []
     for line in datagram.splitlines():
         try:
-            epochs.append(lines.parse(line))
+            samples.append(lines.parse(line))
         except RefusedError as error:
             counts[str(error)] += 1
-    return epochs
+    return samples
 
 
 class Datagrams:
@@ -45,7 +45,7 @@ class Datagrams:
         self.socket.bind(address)
         self.receiver = Receiver(self.socket, LONGEST, BUFFER, POLL)
 
-    def chunks(self) -> Iterator[list[Epoch]]:
+    def chunks(self) -> Iterator[list[Sample]]:
         """Yield what has come, as `Source` says."""
         with self.socket:
             while not self.stopped:
@@ -59,14 +59,14 @@ class Datagrams:
         """Let `chunks` end."""
         self.stopped = True
 
-    def taken(self, datagrams: list[bytes], now: float) -> list[Epoch]:
+    def taken(self, datagrams: list[bytes], now: float) -> list[Sample]:
         """Return what datagrams say that arrived at `now`, s, on a steady clock."""
-        epochs = []
+        samples = []
         for datagram in datagrams:
             if len(datagram) > LONGEST:
                 self.counts["oversized"] += 1
             elif not datagram.strip():
                 self.counts["malformed"] += 1
             else:
-                epochs += self.parse(datagram, self.counts)
-        return self.front.admit(epochs, now)
+                samples += self.parse(datagram, self.counts)
+        return self.front.admit(samples, now)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from statistics import median
 
-from polyins.live.events import Epoch
+from polyins.navigate.samples import Sample
 
 AHEAD = 0.4
 """s by which a stamp may be ahead of the newest before it and the time since then"""
@@ -22,29 +22,29 @@ class Front:
 
     def __init__(self, counts: Counter[str]) -> None:
         self.counts = counts
-        self.held: list[Epoch] = []
+        self.held: list[Sample] = []
         self.since = 0.0
-        """when the first of the held epochs, or the newest that was admitted, arrived, s"""
+        """when the first of the held samples, or the newest that was admitted, arrived, s"""
         self.lead: float | None = None
         """stamp less arrival where the front is, s"""
 
-    def admit(self, epochs: list[Epoch], now: float) -> list[Epoch]:
-        """Return the epochs that are not from the future; `now`: their arrival, s, on any steady clock."""
+    def admit(self, samples: list[Sample], now: float) -> list[Sample]:
+        """Return the samples that are not from the future; `now`: their arrival, s, on any steady clock."""
         if self.lead is None:
             if not self.held:
                 self.since = now
-            self.held += epochs
+            self.held += samples
             if not self.held or (len(self.held) < FIRST_EPOCHS and now - self.since < FIRST_SECONDS):
                 return []
-            epochs = self.release(now)
-        return [epoch for epoch in epochs if self._possible(epoch.time, now)]
+            samples = self.release(now)
+        return [sample for sample in samples if self._possible(sample.time, now)]
 
-    def release(self, now: float) -> list[Epoch]:
-        """Return the epochs that are still held; the front starts from the middle of them."""
-        epochs, self.held = self.held, []
-        if epochs:
-            self.lead, self.since = median(epoch.time for epoch in epochs) - now, now
-        return epochs
+    def release(self, now: float) -> list[Sample]:
+        """Return the samples that are still held; the front starts from the middle of them."""
+        samples, self.held = self.held, []
+        if samples:
+            self.lead, self.since = median(sample.time for sample in samples) - now, now
+        return samples
 
     def _possible(self, time: float, now: float) -> bool:
         assert self.lead is not None

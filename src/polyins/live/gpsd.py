@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from polyins.live.events import Array, GnssEpoch, RefusedError
 from polyins.live.lines import geodetic_position
+from polyins.live.source import RefusedError
 from polyins.model.rig import DEG
+from polyins.navigate.samples import Array, GnssFix
 
 PORT = 2947
 WATCH = b'?WATCH={"enable":true,"json":true};\n'
@@ -23,7 +24,7 @@ SIGMAS_2D = 2.45
 THREE_DIMENSIONS = 3
 
 
-def parse(line: bytes) -> GnssEpoch | None:
+def parse(line: bytes) -> GnssFix | None:
     """Return the fix of a TPV report in three dimensions, None for reports of other kinds.
 
     Stamps are seconds of Unix time, UTC. Raises RefusedError with the kind of what is wrong.
@@ -41,13 +42,13 @@ def parse(line: bytes) -> GnssEpoch | None:
         raise RefusedError("malformed") from None
 
 
-def _fix(report: dict[str, Any]) -> GnssEpoch:
+def _fix(report: dict[str, Any]) -> GnssFix:
     # altHAE is absent where the receiver gives heights above the sea only
     height = report.get("altHAE", report.get("altMSL"))
     if height is None:
         raise RefusedError("no height")
     velocity, velocity_std = _velocity(report)
-    return GnssEpoch(
+    return GnssFix(
         datetime.fromisoformat(report["time"]).timestamp(),
         geodetic_position(report["lat"], report["lon"], height),
         _position_std(report),

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import threading
 
-from polyins.live.events import Epoch
+from polyins.navigate.samples import Sample
 
 FULL = 200_000
-"""epochs; a source that brings more waits, and what a socket cannot hold then is lost and counted there"""
+"""samples; a source that brings more waits, and what a socket cannot hold then is lost and counted there"""
 
 
 class Inbox:
-    """Epochs in the order of their arrival, of bounded number."""
+    """Samples in the order of their arrival, of bounded number."""
 
     def __init__(self, sources: int) -> None:
         self.open = sources
         """sources that have not ended"""
         self.closed = False
-        self.epochs: list[Epoch] = []
+        self.samples: list[Sample] = []
         self.changed = threading.Condition()
 
-    def put(self, epochs: list[Epoch]) -> None:
-        """Add epochs, when there is room for them."""
+    def put(self, samples: list[Sample]) -> None:
+        """Add samples, when there is room for them."""
         with self.changed:
-            while len(self.epochs) >= FULL and not self.closed:
+            while len(self.samples) >= FULL and not self.closed:
                 self.changed.wait()
-            self.epochs += epochs
+            self.samples += samples
             self.changed.notify_all()
 
     def source_ended(self) -> None:
@@ -40,13 +40,13 @@ class Inbox:
             self.closed = True
             self.changed.notify_all()
 
-    def take(self, timeout: float) -> list[Epoch] | None:
+    def take(self, timeout: float) -> list[Sample] | None:
         """Return all that is there, after waiting for at most `timeout`, s; None when nothing can come any more."""
         with self.changed:
-            if not self.epochs and self.open:
+            if not self.samples and self.open:
                 self.changed.wait(timeout)
-            if not self.epochs and not self.open:
+            if not self.samples and not self.open:
                 return None
-            epochs, self.epochs = self.epochs, []
+            samples, self.samples = self.samples, []
             self.changed.notify_all()
-            return epochs
+            return samples

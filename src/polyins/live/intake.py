@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from polyins.config import Config
-from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError, SensorEpoch
+from polyins.live.source import RefusedError
 from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG, Rig
+from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.reading import sensor_stream
 
 
 class Intake:
-    """What a configuration says of mounts, clocks, heights and accuracies, applied to one epoch at a time."""
+    """What a configuration says of mounts, clocks, heights and accuracies, applied to one sample at a time."""
 
     def __init__(self, config: Config, rig: Rig, geodetic: bool) -> None:
         self.rotations = {imu.name: _unless_identity(imu.rotation) for imu in rig.imus}
@@ -21,31 +22,31 @@ class Intake:
         self.sensors = dict(sensor_stream.entries(config))
         self.geodetic = geodetic
 
-    def taken(self, epoch: Epoch) -> Epoch:
-        """Return the epoch as the navigator wants it; raises RefusedError with the kind of what is wrong."""
-        if isinstance(epoch, SensorEpoch):
-            return self._sensor(epoch)
-        return self._imu(epoch) if isinstance(epoch, ImuEpoch) else self._fix(epoch)
+    def taken(self, sample: Sample) -> Sample:
+        """Return the sample as the navigator wants it; raises RefusedError with the kind of what is wrong."""
+        if isinstance(sample, SensorSample):
+            return self._sensor(sample)
+        return self._imu(sample) if isinstance(sample, ImuSample) else self._fix(sample)
 
-    def _imu(self, epoch: ImuEpoch) -> ImuEpoch:
-        if epoch.imu not in self.rotations:
+    def _imu(self, sample: ImuSample) -> ImuSample:
+        if sample.imu not in self.rotations:
             raise RefusedError("unknown IMU")
-        rotation, time = self.rotations[epoch.imu], epoch.time + self.offsets[epoch.imu]
+        rotation, time = self.rotations[sample.imu], sample.time + self.offsets[sample.imu]
         if rotation is None:
-            return epoch._replace(time=time)
-        return ImuEpoch(epoch.imu, time, rotation @ epoch.dtheta, rotation @ epoch.dvel)
+            return sample._replace(time=time)
+        return ImuSample(sample.imu, time, rotation @ sample.dtheta, rotation @ sample.dvel)
 
-    def _sensor(self, epoch: SensorEpoch) -> SensorEpoch:
-        entry = self.sensors.get(epoch.kind)
+    def _sensor(self, sample: SensorSample) -> SensorSample:
+        entry = self.sensors.get(sample.kind)
         if entry is None:
-            raise RefusedError(f"{epoch.kind} without a section {epoch.kind}")
+            raise RefusedError(f"{sample.kind} without a section {sample.kind}")
         given = sensor_stream.std_of(entry)
-        std = epoch.std
+        std = sample.std
         if given is not None:
             std = sensor_stream.with_constraint(entry, np.array([given]))[0]
-        return epoch._replace(time=epoch.time + entry.clock_offset_s, std=std)
+        return sample._replace(time=sample.time + entry.clock_offset_s, std=std)
 
-    def _fix(self, fix: GnssEpoch) -> GnssEpoch:
+    def _fix(self, fix: GnssFix) -> GnssFix:
         entry = self.gnss
         if entry is None:
             raise RefusedError("GNSS without a gnss section")
@@ -56,9 +57,9 @@ class Intake:
         position = self._placed(self._above_ellipsoid(fix), fix.geodetic)
         has_velocity = fix.velocity is not None and fix.velocity_std is not None
         velocity = (fix.velocity, fix.velocity_std) if has_velocity else (None, None)
-        return GnssEpoch(time, position, std, *velocity, geodetic=self.geodetic)
+        return GnssFix(time, position, std, *velocity, geodetic=self.geodetic)
 
-    def _above_ellipsoid(self, fix: GnssEpoch) -> Array:
+    def _above_ellipsoid(self, fix: GnssFix) -> Array:
         assert self.gnss is not None
         if not fix.geodetic or not (fix.above_sea or self.gnss.height == "sea-level"):
             return fix.position

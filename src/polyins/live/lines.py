@@ -1,4 +1,4 @@
-"""The line format, version 1: one line of text per epoch.
+"""The line format, version 1: one line of text per sample.
 
     polyins1,rates,NAME,TIME,INTERVAL,GX,GY,GZ,AX,AY,AZ          s, s, rad/s, m/s^2
     polyins1,increments,NAME,TIME,X,Y,Z,VX,VY,VZ                 s, rad, m/s
@@ -8,7 +8,7 @@
     polyins1,heading,TIME,HEADING,STD                            s, deg
     polyins1,odometer,TIME,SPEED,STD,RIGHT,DOWN                  s, m/s; of no slip the std, or 0
 
-Rates are means over the INTERVAL that ends at TIME, increments belong to the interval since the epoch before. IMU data
+Rates are means over the INTERVAL that ends at TIME, increments belong to the interval since the sample before. IMU data
 are in the sensor's axes. A line may end in `*` and two hexadecimal digits: the exclusive or of the bytes before it.
 """
 
@@ -21,8 +21,9 @@ from operator import xor
 
 import numpy as np
 
-from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError, SensorEpoch
+from polyins.live.source import RefusedError
 from polyins.model.rig import DEG
+from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 
 MAGIC = "polyins1"
 LONGEST = 512
@@ -34,7 +35,7 @@ HEIGHTS = (-12e3, 100e3)  # m
 LARGEST_STD = 1e4  # m, m/s
 
 
-def parse(line: bytes) -> Epoch:
+def parse(line: bytes) -> Sample:
     """Return what a line says; raises RefusedError with the kind of what is wrong with it."""
     if len(line) > LONGEST:
         raise RefusedError("oversized")
@@ -50,20 +51,20 @@ def parse(line: bytes) -> Epoch:
         raise RefusedError("malformed") from None
 
 
-def write(epoch: Epoch) -> str:
-    """Return the line of an epoch, without its end; every digit that the numbers have is kept."""
-    if isinstance(epoch, ImuEpoch):
-        return _joined("increments", epoch.imu, epoch.time, *epoch.dtheta, *epoch.dvel)
-    if isinstance(epoch, SensorEpoch):
-        unit = DEG if epoch.kind == "heading" else 1.0
-        return _joined(epoch.kind, epoch.time, epoch.value / unit, *(epoch.std / unit))
-    assert epoch.position_std is not None
-    values = [*epoch.position_std]
-    if epoch.velocity is not None and epoch.velocity_std is not None:
-        values += [*epoch.velocity, *epoch.velocity_std]
-    if not epoch.geodetic:
-        return _joined("plane", epoch.time, *epoch.position, *values)
-    return _joined("gnss", epoch.time, *(epoch.position / [DEG, DEG, 1.0]), *values)
+def write(sample: Sample) -> str:
+    """Return the line of a sample, without its end; every digit that the numbers have is kept."""
+    if isinstance(sample, ImuSample):
+        return _joined("increments", sample.imu, sample.time, *sample.dtheta, *sample.dvel)
+    if isinstance(sample, SensorSample):
+        unit = DEG if sample.kind == "heading" else 1.0
+        return _joined(sample.kind, sample.time, sample.value / unit, *(sample.std / unit))
+    assert sample.position_std is not None
+    values = [*sample.position_std]
+    if sample.velocity is not None and sample.velocity_std is not None:
+        values += [*sample.velocity, *sample.velocity_std]
+    if not sample.geodetic:
+        return _joined("plane", sample.time, *sample.position, *values)
+    return _joined("gnss", sample.time, *(sample.position / [DEG, DEG, 1.0]), *values)
 
 
 def _joined(kind: str, *fields: str | float) -> str:
@@ -93,26 +94,26 @@ def _numbers(fields: list[str], *counts: int) -> list[float]:
     return numbers
 
 
-def _increments(fields: list[str]) -> ImuEpoch:
+def _increments(fields: list[str]) -> ImuSample:
     time, *values = _numbers(fields[1:], 7)
     return imu_epoch(fields[0], time, np.array(values[:3]), np.array(values[3:]))
 
 
-def _rates(fields: list[str]) -> ImuEpoch:
+def _rates(fields: list[str]) -> ImuSample:
     time, interval, *values = _numbers(fields[1:], 8)
     if not 0.0 < interval <= LONGEST_INTERVAL:
         raise RefusedError("implausible")
     return imu_epoch(fields[0], time, np.array(values[:3]) * interval, np.array(values[3:]) * interval)
 
 
-def imu_epoch(name: str, time: float, dtheta: Array, dvel: Array) -> ImuEpoch:
-    """Return the epoch; raises RefusedError for increments that no vehicle makes."""
+def imu_epoch(name: str, time: float, dtheta: Array, dvel: Array) -> ImuSample:
+    """Return the sample; raises RefusedError for increments that no vehicle makes."""
     if np.abs(dtheta).max() > LARGEST_ANGLE or np.abs(dvel).max() > LARGEST_CHANGE:
         raise RefusedError("implausible")
-    return ImuEpoch(name, time, dtheta, dvel)
+    return ImuSample(name, time, dtheta, dvel)
 
 
-def _geodetic(fields: list[str]) -> GnssEpoch:
+def _geodetic(fields: list[str]) -> GnssFix:
     time, latitude, longitude, height, *rest = _numbers(fields, 7, 13)
     return _fix(time, geodetic_position(latitude, longitude, height), rest, True)
 
@@ -126,28 +127,28 @@ def geodetic_position(latitude_deg: float, longitude_deg: float, height: float) 
     return np.array([latitude_deg * DEG, longitude_deg * DEG, height])
 
 
-def _plane(fields: list[str]) -> GnssEpoch:
+def _plane(fields: list[str]) -> GnssFix:
     time, *values = _numbers(fields, 7, 13)
     return _fix(time, np.array(values[:3]), values[3:], False)
 
 
-def _fix(time: float, position: Array, rest: list[float], geodetic: bool) -> GnssEpoch:
+def _fix(time: float, position: Array, rest: list[float], geodetic: bool) -> GnssFix:
     std = np.array(rest[:3])
     velocity, velocity_std = (np.array(rest[3:6]), np.array(rest[6:9])) if len(rest) > 3 else (None, None)
     for spread in (std, velocity_std):
         if spread is not None and (spread.min() <= 0.0 or spread.max() > LARGEST_STD):
             raise RefusedError("implausible")
-    return GnssEpoch(time, position, std, velocity, velocity_std, geodetic)
+    return GnssFix(time, position, std, velocity, velocity_std, geodetic)
 
 
-def _sensor(kind: str, count: int, unit: float, fields: list[str]) -> SensorEpoch:
+def _sensor(kind: str, count: int, unit: float, fields: list[str]) -> SensorSample:
     time, value, *std = _numbers(fields, 2 + count)
     if std[0] <= 0.0 or min(std) < 0.0 or max(std) > LARGEST_STD:
         raise RefusedError("implausible")
-    return SensorEpoch(kind, time, value * unit, np.array(std) * unit)
+    return SensorSample(kind, time, value * unit, np.array(std) * unit)
 
 
-_PARSERS: dict[str, Callable[[list[str]], Epoch]] = {
+_PARSERS: dict[str, Callable[[list[str]], Sample]] = {
     "increments": _increments,
     "rates": _rates,
     "gnss": _geodetic,

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, RefusedError
 from polyins.live.lines import LONGEST_INTERVAL, geodetic_position, imu_epoch
+from polyins.live.source import RefusedError
+from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample
 
 MILLI_G = 9.80665e-3  # m/s^2
 RAW_KINDS = ("RAW_IMU", "SCALED_IMU", "HIGHRES_IMU")
@@ -26,7 +27,7 @@ NO_VELOCITY = 8 + 16
 
 
 class MavlinkReader:
-    """Turns datagrams of MAVLink into epochs."""
+    """Turns datagrams of MAVLink into samples."""
 
     def __init__(self, imus: tuple[str, ...]) -> None:
         try:
@@ -40,7 +41,7 @@ class MavlinkReader:
         """message by which each IMU is followed"""
         self.newest: dict[int, float] = {}
         """stamp of each IMU's last message, s"""
-        self.readers: dict[str, Callable[[Any], Epoch | None]] = {
+        self.readers: dict[str, Callable[[Any], Sample | None]] = {
             "RAW_IMU": lambda m: self._imu(m, m.id, m.time_usec * 1e-6, 1e-3, MILLI_G),
             "SCALED_IMU": lambda m: self._imu(m, 0, m.time_boot_ms * 1e-3, 1e-3, MILLI_G),
             "SCALED_IMU2": lambda m: self._imu(m, 1, m.time_boot_ms * 1e-3, 1e-3, MILLI_G),
@@ -50,21 +51,21 @@ class MavlinkReader:
             "GPS_INPUT": _input_fix,
         }
 
-    def __call__(self, datagram: bytes, counts: Counter[str]) -> list[Epoch]:
-        """Return the epochs of a datagram; what is refused is counted by kind, messages of other kinds are not."""
-        epochs = []
+    def __call__(self, datagram: bytes, counts: Counter[str]) -> list[Sample]:
+        """Return the samples of a datagram; what is refused is counted by kind, messages of other kinds are not."""
+        samples = []
         for message in self.link.parse_buffer(datagram) or ():
             kind = message.get_type()
             try:
                 if kind == "BAD_DATA":
                     raise RefusedError("malformed")
-                if kind in self.readers and (epoch := self.readers[kind](message)) is not None:
-                    epochs.append(epoch)
+                if kind in self.readers and (sample := self.readers[kind](message)) is not None:
+                    samples.append(sample)
             except RefusedError as error:
                 counts[str(error)] += 1
-        return epochs
+        return samples
 
-    def _imu(self, message: Any, number: int, time: float, gyro: float, accel: float) -> ImuEpoch | None:
+    def _imu(self, message: Any, number: int, time: float, gyro: float, accel: float) -> ImuSample | None:
         """Return the increments since the message before; None for the first, and where a finer message is followed."""
         if number >= len(self.imus):
             raise RefusedError("unknown IMU")
@@ -96,17 +97,17 @@ def _finer(kind: str, known: str) -> bool:
     return RAW_KINDS.index(kind) > RAW_KINDS.index(known)
 
 
-def _raw_fix(message: Any) -> GnssEpoch:
+def _raw_fix(message: Any) -> GnssFix:
     if message.fix_type < THREE_DIMENSIONS:
         raise RefusedError("no fix in three dimensions")
     above_sea = message.alt_ellipsoid == 0  # it is an extension that old senders leave out
     height = 1e-3 * (message.alt if above_sea else message.alt_ellipsoid)
     position = geodetic_position(message.lat * 1e-7, message.lon * 1e-7, height)
     std = _std(1e-3 * message.h_acc, 1e-3 * message.v_acc)
-    return GnssEpoch(message.time_usec * 1e-6, position, std, above_sea=above_sea)
+    return GnssFix(message.time_usec * 1e-6, position, std, above_sea=above_sea)
 
 
-def _input_fix(message: Any) -> GnssEpoch:
+def _input_fix(message: Any) -> GnssFix:
     if message.fix_type < THREE_DIMENSIONS:
         raise RefusedError("no fix in three dimensions")
     position = geodetic_position(message.lat * 1e-7, message.lon * 1e-7, message.alt)
@@ -115,7 +116,7 @@ def _input_fix(message: Any) -> GnssEpoch:
         velocity = np.array([message.vn, message.ve, message.vd])
         velocity_std = np.full(3, float(message.speed_accuracy))
     std = _std(message.horiz_accuracy, message.vert_accuracy)
-    return GnssEpoch(message.time_usec * 1e-6, position, std, velocity, velocity_std, above_sea=True)
+    return GnssFix(message.time_usec * 1e-6, position, std, velocity, velocity_std, above_sea=True)
 
 
 def _std(horizontal: float, vertical: float) -> Array | None:

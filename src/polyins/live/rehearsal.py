@@ -13,8 +13,8 @@ import numpy as np
 from polyins.live.replay import Replay
 from polyins.live.session import Session
 from polyins.live.sinks import Outlet, ParquetLog
-from polyins.live.starter import Starter
 from polyins.model.recording import GnssStream, ImuStream, Recording, StartOptions
+from polyins.navigate.starter import Starter
 from polyins.prepare.alignment import Start
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ def rehearse(recording: Recording, method: str, delay: float, begin: Callable[[S
         outlet = Outlet(ParquetLog(Path(folder) / "log.parquet", {}), RATE_HZ)
         session = Session(Starter(replace(still, imus=(), gnss=None), delay, True, method), begin, [outlet])
         for chunk in Replay(still).chunks():
-            for epoch in chunk:
-                session.take(epoch)
+            for sample in chunk:
+                session.take(sample)
         session.finish()
         session.report()
         outlet.sink.close()

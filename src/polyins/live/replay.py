@@ -1,4 +1,4 @@
-"""A recording as a source: its epochs in the order of their stamps, at real speed, faster, or as fast as it goes."""
+"""A recording as a source: its samples in the order of their stamps, at real speed, faster, or as fast as it goes."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from polyins.live.events import Epoch, GnssEpoch, ImuEpoch, SensorEpoch
 from polyins.live.source import POLL
 from polyins.model.recording import Recording
+from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
 
 AT_ONCE = 256
-"""epochs in a chunk"""
+"""samples in a chunk"""
 TICK = 0.02
 """s of waiting that are worth a chunk of their own"""
 
 
 class Replay:
-    """The epochs of a recording; fixes in its outages are withheld."""
+    """The samples of a recording; fixes in its outages are withheld."""
 
     def __init__(self, recording: Recording, speed: float = math.inf, after: float = -math.inf) -> None:
         """`speed`: seconds of data per second; `after`: leave out what is not after this time, s."""
@@ -32,20 +32,20 @@ class Replay:
         self.after = after
         self.stopped = threading.Event()
 
-    def chunks(self) -> Iterator[list[Epoch]]:
+    def chunks(self) -> Iterator[list[Sample]]:
         """Yield what is due, as `Source` says."""
         begin, first = time.monotonic(), None
-        pending: list[Epoch] = []
-        for epoch in self._epochs():
+        pending: list[Sample] = []
+        for sample in self._samples():
             if self.stopped.is_set():
                 return
-            first = epoch.time if first is None else first
-            due = begin + (epoch.time - first) / self.speed
+            first = sample.time if first is None else first
+            due = begin + (sample.time - first) / self.speed
             if len(pending) >= AT_ONCE or (pending and due - time.monotonic() > TICK):
                 yield pending
                 pending = []
                 self._wait_until(due)
-            pending.append(epoch)
+            pending.append(sample)
         yield pending
 
     def stop(self) -> None:
@@ -56,14 +56,14 @@ class Replay:
         while not self.stopped.is_set() and (left := due - time.monotonic()) > 0.0:
             self.stopped.wait(min(left, POLL))
 
-    def _epochs(self) -> Iterator[Epoch]:
+    def _samples(self) -> Iterator[Sample]:
         imus, gnss, aiding = self.recording.imus, self.recording.gnss, self.recording.aiding
         times = [stream.time for stream in imus] + [shown.time for shown in aiding]
         times += [] if gnss is None else [gnss.time]
         stamps = np.concatenate(times)
         stream_of = np.repeat(np.arange(len(times)), [len(one) for one in times])
         row_of = np.concatenate([np.arange(len(one)) for one in times])
-        # what is measured at an epoch is in the state of that epoch
+        # what is measured at a sample is in the state of that sample
         due = stamps - np.where(stream_of < len(imus), 0.0, self.recording.options.gnss_snap)
         for k in np.lexsort([stream_of, due]):
             if stamps[k] <= self.after:
@@ -71,20 +71,20 @@ class Replay:
             number, row = stream_of[k], row_of[k]
             if number < len(imus):
                 stream = imus[number]
-                yield ImuEpoch(stream.name, float(stamps[k]), stream.dtheta[row], stream.dvel[row])
+                yield ImuSample(stream.name, float(stamps[k]), stream.dtheta[row], stream.dvel[row])
             elif number < len(imus) + len(aiding):
                 shown = aiding[number - len(imus)]
-                yield SensorEpoch(shown.kind, float(stamps[k]), float(shown.value[row]), shown.std[row])
+                yield SensorSample(shown.kind, float(stamps[k]), float(shown.value[row]), shown.std[row])
             elif not self._withheld(float(stamps[k])):
                 yield self._fix(row)
 
     def _withheld(self, stamp: float) -> bool:
         return any(begin < stamp < end for begin, end in self.recording.outages)
 
-    def _fix(self, row: int) -> GnssEpoch:
+    def _fix(self, row: int) -> GnssFix:
         gnss = self.recording.gnss
         assert gnss is not None
         velocity = None if gnss.velocity is None or gnss.velocity_std is None else gnss.velocity[row]
         velocity_std = None if gnss.velocity is None or gnss.velocity_std is None else gnss.velocity_std[row]
         time, position, std = float(gnss.time[row]), gnss.position[row], gnss.position_std[row]
-        return GnssEpoch(time, position, std, velocity, velocity_std, geodetic=self.recording.geodetic)
+        return GnssFix(time, position, std, velocity, velocity_std, geodetic=self.recording.geodetic)

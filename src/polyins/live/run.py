@@ -22,7 +22,6 @@ from polyins.errors import InputError
 from polyins.files import make_folder
 from polyins.formats.documents import write_document
 from polyins.kernels.compilation import compilation_said
-from polyins.live.events import Epoch, RefusedError
 from polyins.live.inbox import Inbox
 from polyins.live.intake import Intake
 from polyins.live.page import RATE_HZ as PAGE_RATE_HZ
@@ -31,12 +30,13 @@ from polyins.live.rehearsal import rehearse
 from polyins.live.replay import Replay
 from polyins.live.session import Checkpoints, Session
 from polyins.live.sinks import Outlet, ParquetLog, open_sink
-from polyins.live.source import POLL, Source
+from polyins.live.source import POLL, RefusedError, Source
 from polyins.live.sources import open_source
-from polyins.live.starter import Starter
 from polyins.model.methods import find_method
 from polyins.model.recording import Recording
 from polyins.navigate import choice
+from polyins.navigate.samples import Sample
+from polyins.navigate.starter import Starter
 from polyins.prepare.alignment import Start
 from polyins.reading import loading
 from polyins.screen import say
@@ -132,13 +132,13 @@ class Live:
             say(f"page: {self.page.url}")
 
     def run(self) -> None:
-        """Take epochs until none can come any more, or until a signal; what has come by then is taken."""
+        """Take samples until none can come any more, or until a signal; what has come by then is taken."""
         threads = [threading.Thread(target=self._pump, args=pair, daemon=True) for pair in self.sources]
         for thread in threads:
             thread.start()
         try:
-            while not self.signals and (epochs := self.inbox.take(POLL)) is not None:
-                self._take(epochs)
+            while not self.signals and (samples := self.inbox.take(POLL)) is not None:
+                self._take(samples)
             self.stopped_by = self.signals[0] if self.signals else ""
             self._take(self.inbox.take(0.0) or [])
             self.session.finish()
@@ -150,9 +150,9 @@ class Live:
         if self.failure is not None:
             raise self.failure
 
-    def _take(self, epochs: list[Epoch]) -> None:
-        for epoch in epochs:
-            self.session.take(epoch)
+    def _take(self, samples: list[Sample]) -> None:
+        for sample in samples:
+            self.session.take(sample)
         if self.session.navigator is None:
             self._tell_what_is_missing()
 
@@ -166,8 +166,8 @@ class Live:
 
     def _pump(self, source: Source, intake: Intake | None) -> None:
         try:
-            for epochs in source.chunks():
-                self.inbox.put(_admitted(epochs, source, intake))
+            for samples in source.chunks():
+                self.inbox.put(_admitted(samples, source, intake))
         except Exception as error:
             self.failure = error  # told when what has come is safe
         finally:
@@ -207,8 +207,8 @@ class Live:
             "geodetic": session.starter.blank.geodetic,
             "start": session.start and {"time_s": session.start.time, **session.start.sources},
             "end_s": session.last.state.time if session.last else None,
-            "epochs": {name: session.epochs[name] for name in names},
-            "fixes": session.epochs["GNSS"],
+            "epochs": {name: session.samples[name] for name in names},
+            "fixes": session.samples["GNSS"],
             "refused": dict(sorted(self.refused().items())),
             "imus": report.get("imus", []),
             "checkpoints": checkpoints,
@@ -217,13 +217,13 @@ class Live:
         }
 
 
-def _admitted(epochs: list[Epoch], source: Source, intake: Intake | None) -> list[Epoch]:
+def _admitted(samples: list[Sample], source: Source, intake: Intake | None) -> list[Sample]:
     if intake is None:
-        return epochs
+        return samples
     admitted = []
-    for epoch in epochs:
+    for sample in samples:
         try:
-            admitted.append(intake.taken(epoch))
+            admitted.append(intake.taken(sample))
         except RefusedError as error:
             source.counts[str(error)] += 1
     return admitted

@@ -1,4 +1,4 @@
-"""One run on live epochs: start, navigate, pass states on, keep checkpoints."""
+"""One run on live samples: start, navigate, pass states on, keep checkpoints."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polyins.files import write_bytes
-from polyins.live.events import Array, Epoch, ImuEpoch, SensorEpoch
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
-from polyins.live.starter import Starter
+from polyins.navigate.samples import Array, ImuSample, Sample, SensorSample
+from polyins.navigate.starter import Starter, after_start
 from polyins.prepare.alignment import Start
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 SILENT_GNSS = 2.0
 """s without a fix that are dead reckoning; at least, and 2.5 times the usual interval"""
-BEFORE_START = 2.0
-"""s of data before the start, by which the navigator knows the rates of the IMUs"""
 LONGEST_LAG = 1.0
 """s by which a state is taken to follow the stamp of what has come"""
 
@@ -49,7 +47,7 @@ class Checkpoints:
 
 
 class Session:
-    """Takes epochs in the order of their arrival."""
+    """Takes samples in the order of their arrival."""
 
     def __init__(
         self,
@@ -66,7 +64,7 @@ class Session:
         self.navigator: Navigator | None = None
         self.start: Start | None = None
         self.origin: Array | None = None
-        self.epochs: Counter[str] = Counter()
+        self.samples: Counter[str] = Counter()
         """what the navigator took, by IMU, fixes as GNSS, and by kind of sensor"""
         self.fix_times: deque[float] = deque(maxlen=6)
         self.due = float("-inf")
@@ -79,20 +77,18 @@ class Session:
         if navigator.state is not None:
             self.fix_times.append(navigator.state.time)  # what it knows, a fix would have said
 
-    def take(self, epoch: Epoch) -> None:
-        """Take the next epoch."""
+    def take(self, sample: Sample) -> None:
+        """Take the next sample."""
         if self.navigator is not None:
-            self._feed(epoch)
-        elif (found := self.starter.take(epoch)) is not None:
+            self._feed(sample)
+        elif (found := self.starter.take(sample)) is not None:
             self._begin(*found)
 
-    def _begin(self, start: Start, collected: list[Epoch]) -> None:
+    def _begin(self, start: Start, collected: list[Sample]) -> None:
         self.start, self.navigator = start, self.begin(start)
         self.fix_times.append(start.time)  # what the start knows, a fix would have said
-        for one in collected:
-            # earlier fixes are in the start
-            if one.time > start.time - (BEFORE_START if isinstance(one, ImuEpoch) else 0.0):
-                self._feed(one)
+        for one in after_start(start, collected):
+            self._feed(one)
 
     def finish(self) -> None:
         """Let the navigator take what still waits, and pass the last state on."""
@@ -107,30 +103,30 @@ class Session:
         if self.checkpoints is not None and self.checkpoints.every < float("inf"):
             self.navigator.save(self.checkpoints.path)
 
-    def _feed(self, epoch: Epoch) -> None:
+    def _feed(self, sample: Sample) -> None:
         assert self.navigator is not None
         refused = sum(self.navigator.counts.values())
-        if isinstance(epoch, ImuEpoch):
-            self.navigator.imu(epoch.time, epoch.dtheta, epoch.dvel, self.index[epoch.imu])
-        elif isinstance(epoch, SensorEpoch):
-            self.navigator.aid(epoch.kind, epoch.time, epoch.value, epoch.std)
+        if isinstance(sample, ImuSample):
+            self.navigator.imu(sample.time, sample.dtheta, sample.dvel, self.index[sample.imu])
+        elif isinstance(sample, SensorSample):
+            self.navigator.aid(sample.kind, sample.time, sample.value, sample.std)
         else:
-            assert epoch.position_std is not None
-            self.navigator.gnss(epoch.time, epoch.position, epoch.position_std, epoch.velocity, epoch.velocity_std)
+            assert sample.position_std is not None
+            self.navigator.gnss(sample.time, sample.position, sample.position_std, sample.velocity, sample.velocity_std)
         # when a state is told depends on what was taken, never on what was refused
         if sum(self.navigator.counts.values()) == refused:
-            self._taken(epoch)
+            self._taken(sample)
 
-    def _taken(self, epoch: Epoch) -> None:
-        if isinstance(epoch, ImuEpoch):
-            self.epochs[epoch.imu] += 1
-        elif isinstance(epoch, SensorEpoch):
-            self.epochs[epoch.kind] += 1
+    def _taken(self, sample: Sample) -> None:
+        if isinstance(sample, ImuSample):
+            self.samples[sample.imu] += 1
+        elif isinstance(sample, SensorSample):
+            self.samples[sample.kind] += 1
         else:
-            self.epochs["GNSS"] += 1
-            self.fix_times.append(epoch.time)
-        if epoch.time >= self.due:
-            self._look(epoch.time)
+            self.samples["GNSS"] += 1
+            self.fix_times.append(sample.time)
+        if sample.time >= self.due:
+            self._look(sample.time)
 
     def _look(self, time: float) -> None:
         assert self.navigator is not None

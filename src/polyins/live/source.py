@@ -1,4 +1,4 @@
-"""Where epochs come from: what every source does, and which one a URL names."""
+"""Where samples come from: what every source does, and which one a URL names."""
 
 from __future__ import annotations
 
@@ -8,21 +8,25 @@ from typing import Protocol
 from urllib.parse import SplitResult
 
 from polyins.errors import InputError
-from polyins.live.events import Epoch
+from polyins.navigate.samples import Sample
 
 POLL = 0.2
 """s after which a source that waits for data looks whether it should stop"""
 LOOPBACK = "127.0.0.1"
 
 
+class RefusedError(Exception):
+    """A sample that cannot be used; the message is the kind under which it is counted."""
+
+
 class Source(Protocol):
-    """Epochs as they come; runs in a thread of its own."""
+    """Samples as they come; runs in a thread of its own."""
 
     url: str
     counts: Counter[str]
     """what was refused, by kind"""
 
-    def chunks(self) -> Iterator[list[Epoch]]:
+    def chunks(self) -> Iterator[list[Sample]]:
         """Yield what has come; ends with the data, or soon after `stop`."""
         ...
 

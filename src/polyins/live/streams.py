@@ -14,9 +14,9 @@ from urllib.parse import SplitResult, parse_qs
 
 from polyins.errors import InputError
 from polyins.live import lines
-from polyins.live.events import Epoch, RefusedError
 from polyins.live.front import Front
-from polyins.live.source import POLL
+from polyins.live.source import POLL, RefusedError
+from polyins.navigate.samples import Sample
 from polyins.screen import say
 
 AT_ONCE = 65536  # bytes
@@ -127,7 +127,7 @@ class LineStream:
         self,
         url: str,
         link: Link,
-        parse: Callable[[bytes], Epoch | None] = lines.parse,
+        parse: Callable[[bytes], Sample | None] = lines.parse,
         longest: int = lines.LONGEST,
         checked: bool = False,
     ) -> None:
@@ -140,7 +140,7 @@ class LineStream:
         self.stopped = False
         self.rest = b""
 
-    def chunks(self) -> Iterator[list[Epoch]]:
+    def chunks(self) -> Iterator[list[Sample]]:
         """Yield what has come, as `Source` says."""
         told = ""
         while not self.stopped:
@@ -172,7 +172,7 @@ class LineStream:
         while not self.stopped and time.monotonic() < until:
             time.sleep(POLL)
 
-    def _until_the_end(self) -> Iterator[list[Epoch]]:
+    def _until_the_end(self) -> Iterator[list[Sample]]:
         self.rest = b""
         while not self.stopped:
             data = self.link.read()
@@ -181,16 +181,16 @@ class LineStream:
                 return
             yield self.taken(data)
 
-    def taken(self, data: bytes) -> list[Epoch]:
+    def taken(self, data: bytes) -> list[Sample]:
         """Return what the lines say that end in `data`; the beginning of the next one is kept."""
         *whole, self.rest = (self.rest + data).split(b"\n")
         if len(self.rest) > self.longest:
             # of a line without an end, only that it is too long matters
             self.rest = self.rest[: self.longest + 1]
-        epochs = [epoch for line in whole if line.strip() and (epoch := self._parsed(line)) is not None]
-        return epochs if self.front is None else self.front.admit(epochs, time.monotonic())
+        samples = [sample for line in whole if line.strip() and (sample := self._parsed(line)) is not None]
+        return samples if self.front is None else self.front.admit(samples, time.monotonic())
 
-    def _parsed(self, line: bytes) -> Epoch | None:
+    def _parsed(self, line: bytes) -> Sample | None:
         try:
             return self.parse(line)
         except RefusedError as error:

@@ -42,7 +42,8 @@ class Made:
     polyins: str
     """version"""
     rig: Rig
-    start: Start
+    start: Start | None
+    """None as long as it is looked for, which is not written"""
     method: str
     options: FilterOptions
     geodetic: bool

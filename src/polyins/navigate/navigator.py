@@ -16,12 +16,14 @@ from polyins.aiding import kinds
 from polyins.errors import InputError
 from polyins.model.attitude import euler_angles, euler_variance
 from polyins.model.methods import find_method
-from polyins.model.recording import AidingStream, FilterOptions, Recording
+from polyins.model.recording import AidingStream, FilterOptions, Recording, StartOptions
 from polyins.model.rig import Rig
 from polyins.navigate import batch, checkpoint, events
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
+from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
+from polyins.navigate.starter import Starter, after_start
 from polyins.navigate.timeline import Timeline
 from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
@@ -83,40 +85,43 @@ class ImuHealth:
 
 
 class Navigator:
-    """Navigates with the IMUs of a rig from a known start.
+    """Navigates with the IMUs of a rig from a start that is known or found in the data.
 
-    `method` and `options` are those of a batch run; `imu` is the index of the IMU that `single` uses. `delay`: how late
-    a measurement may come, s. `wait`: how long, in time of the data, an epoch waits for a sample that is missing, s;
-    samples of several IMUs may arrive in any order within it. The gyros of the IMUs need not be synchronised: epochs
-    are those of the first IMU. Raises InputError for a method that the rig has not the IMUs for.
+    `start`: where it is known, or what is known of it; unless given all is found, as in a batch run, and `state` is
+    None until then, for which `waits_for` says the reason. `method` and `options` are those of a batch run; `imu` is
+    the index of the IMU that `single` uses. `fixes`: GNSS will give the position; unless said it does where positions
+    are geodetic and the start's is not given. `delay`: how late a measurement may come, s. `wait`: how long, in time of
+    the data, an epoch waits for a sample that is missing, s; samples of several IMUs may arrive in any order within it.
+    The gyros of the IMUs need not be synchronised: epochs are those of the first IMU. Raises InputError for a method
+    that the rig has not the IMUs for.
     """
 
     def __init__(
         self,
         rig: Rig,
-        start: Start,
+        start: Start | StartOptions | None = None,
         *,
         method: str = "enav-fusion",
         options: FilterOptions | None = None,
         geodetic: bool = True,
         imu: int = 0,
+        fixes: bool | None = None,
         delay: float = 1.0,
         wait: float = 0.05,
     ) -> None:
         self.method = find_method(method)
         choice = choose(self.method, rig, imu)
         self._taken = choice.all
-        if len(start.imu_errors) != len(rig.imus):
-            raise InputError(f"start: errors of {len(start.imu_errors)} IMUs; expected those of {len(rig.imus)}")
         options = options or FilterOptions()
-        self._made = Made(__version__, rig, start, method, options, geodetic, imu, delay, wait, {}, None, None)
-        rig, self.start, self.delay = rig.subset(self._taken), start.subset(self._taken), delay
-        self._recording = Recording(rig, (), geodetic=geodetic, options=options)
-        self._imus = len(start.imu_errors)
+        self.start: Start | None = None
+        self.delay = delay
+        self._made = Made(__version__, rig, None, method, options, geodetic, imu, delay, wait, {}, None, None)
+        self._recording = Recording(rig.subset(self._taken), (), geodetic=geodetic, options=options)
+        self._imus = len(rig.imus)
         self._takes_some = self._taken != list(range(self._imus))
         self._place = {index: place for place, index in enumerate(self._taken)}
         self._choice = choice.renumbered()
-        self._assembly = Assembly(len(rig.imus), wait, bridge=not rig.has_wheels)
+        self._assembly = Assembly(len(self._taken), wait, bridge=not rig.has_wheels)
         self._schedule: wheels.Schedule | None = None
         self._timeline: Timeline | None = None
         self._order: list[int] = []
@@ -126,6 +131,46 @@ class Navigator:
         """measurements that came before the first epoch"""
         self.counts: dict[str, int] = {}
         """what was refused, by kind"""
+        self._starter: Starter | None = None
+        if isinstance(start, Start):
+            self._begin_from(start)
+        else:
+            known = start or StartOptions()
+            needs_fix = (geodetic and known.position is None) if fixes is None else fixes
+            blank = Recording(rig, (), geodetic=geodetic, start=known, options=options)
+            self._starter = Starter(blank, max(delay, wait), needs_fix, method, imu)
+
+    @property
+    def waits_for(self) -> str:
+        """Why there is no start yet; empty once there is one."""
+        return "" if self._starter is None else self._starter.why
+
+    def _begin_from(self, start: Start) -> None:
+        if len(start.imu_errors) != self._imus:
+            raise InputError(f"start: errors of {len(start.imu_errors)} IMUs; expected those of {self._imus}")
+        self._made = replace(self._made, start=start)
+        self.start, self._starter = start.subset(self._taken), None
+
+    def _collect(self, sample: Sample | None) -> None:
+        """Let the search for a start take a sample, or look at all that there is; go on from the start it finds."""
+        starter = self._starter
+        assert starter is not None
+        found = starter.finish() if sample is None else starter.take(sample)
+        if found is None:
+            return
+        start, collected = found
+        for kind, count in starter.counts.items():
+            self.counts[kind] = self.counts.get(kind, 0) + count
+        self._begin_from(start)
+        names = [imu.name for imu in self._made.rig.imus]
+        for one in after_start(start, collected):
+            if isinstance(one, ImuSample):
+                self.imu(one.time, one.dtheta, one.dvel, names.index(one.imu))
+            elif isinstance(one, SensorSample):
+                self.aid(one.kind, one.time, one.value, one.std)
+            else:
+                assert one.position_std is not None
+                self.gnss(one.time, one.position, one.position_std, one.velocity, one.velocity_std)
 
     def imu(self, time: float, dtheta: ArrayLike, dvel: ArrayLike, imu: int | None = None) -> None:
         """Take what IMU `imu` of the rig measured in the interval that ends at `time`, s: rad and m/s, shape (3,).
@@ -140,6 +185,8 @@ class Navigator:
         values[:3], values[3:] = dtheta, dvel
         if not _finite(time, values):
             self._refuse(NOT_FINITE)
+        elif self._starter is not None:
+            self._collect(ImuSample(self._made.rig.imus[imu].name, time, values[:3], values[3:]))
         elif imu in self._place:
             refused = self._assembly.add(self._place[imu], time, values)
             if refused:
@@ -159,6 +206,9 @@ class Navigator:
         It may come `delay` seconds late and is applied at its own time all the same. A fix that cannot be taken is
         counted in `counts`.
         """
+        if self._starter is not None:
+            self._collect_fix(time, position, position_std, velocity, velocity_std)
+            return
         antenna = self._recording.rig.antenna
         fix = [events.of_point(kinds.GNSS_POSITION, time, position, antenna, position_std)]
         if velocity is not None and velocity_std is not None:
@@ -172,11 +222,39 @@ class Navigator:
         come `delay` seconds late. What cannot be taken is counted in `counts`. Raises InputError for another kind.
         """
         stds = np.atleast_1d(np.asarray(std, dtype=np.float64))
+        if self._starter is not None:
+            self._recording.rig.sensor(kind)
+            if math.isfinite(time + value + stds.sum()):
+                self._collect(SensorSample(kind, time, value, stds))
+            else:
+                self._refuse(NOT_FINITE)
+            return
         stream = AidingStream(kind, np.array([time]), np.array([value], dtype=np.float64), stds[None])
         self._measure(events.of_sensor(stream, self._recording.rig))
 
+    def _collect_fix(
+        self,
+        time: float,
+        position: ArrayLike,
+        position_std: ArrayLike,
+        velocity: ArrayLike | None,
+        velocity_std: ArrayLike | None,
+    ) -> None:
+        place, std = np.asarray(position, dtype=np.float64), np.asarray(position_std, dtype=np.float64)
+        speed = None if velocity is None or velocity_std is None else np.asarray(velocity, dtype=np.float64)
+        speed_std = None if speed is None else np.asarray(velocity_std, dtype=np.float64)
+        if not math.isfinite(time + place.sum() + std.sum()):
+            self._refuse(NOT_FINITE)
+        elif not (std > 0.0).all():
+            self._refuse(NO_STD)
+        else:
+            geodetic = self._recording.geodetic
+            self._collect(GnssFix(time, place, std, speed, speed_std, geodetic=geodetic))
+
     def flush(self) -> None:
         """Take everything that still waits: there are no more data."""
+        if self._starter is not None:
+            self._collect(None)
         self._step(at_end=True)
 
     @property
@@ -214,7 +292,12 @@ class Navigator:
         )
 
     def save(self, path: Path | str) -> None:
-        """Write everything to a file from which `resume` goes on as if nothing had happened."""
+        """Write everything to a file from which `resume` goes on as if nothing had happened.
+
+        Raises InputError as long as there is no start.
+        """
+        if self._starter is not None:
+            raise InputError(f"{path}: there is no start yet ({self.waits_for}); expected one before a checkpoint")
         due = None if self._schedule is None else self._schedule.memory
         made = replace(self._made, counts=self.counts, first=self._first, due=due)
         checkpoint.write(Path(path), made, self._assembly, events.merged(*self._early), self._timeline)
@@ -250,6 +333,10 @@ class Navigator:
     def _all(self, time: float, values: Array) -> None:
         if len(values) != self._imus:
             raise InputError(f"imu: increments of {len(values)} IMUs; expected those of {self._imus}")
+        if self._starter is not None:
+            for i, row in enumerate(values):
+                self.imu(time, row[:3], row[3:], i)
+            return
         if self._takes_some:
             values = values[self._taken]
         if not _finite(time, values.ravel()):
@@ -272,11 +359,12 @@ class Navigator:
             self._append(epoch, self._timeline)
         elif self._first is not None:
             self._begin(self._first, epoch)
-        elif epoch.time >= self.start.time:
+        elif self.start is not None and epoch.time >= self.start.time:
             self._first = epoch
 
     def _new_timeline(self, time: Array, increments: Array) -> Timeline:
         """Lay the method out for its first two epochs."""
+        assert self.start is not None
         aligned = Aligned(time, increments, (), np.zeros((len(time), len(self._taken)), dtype=bool))
         prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start, gaps=True)
         self._order = prepared.order
@@ -294,6 +382,7 @@ class Navigator:
 
     def _append(self, epoch: Epoch, line: Timeline) -> None:
         """Complete an epoch by what the rig says of it, and let the timeline take it."""
+        assert self.start is not None
         rig, interval = self._recording.rig, np.array([epoch.time - line.time])
         increments, present = epoch.increments, np.ones(len(rig.imus), dtype=np.uint8)
         if epoch.missing.any():

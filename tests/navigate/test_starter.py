@@ -8,24 +8,24 @@ import pytest
 from driven_vehicle import drive
 
 import polyins as pi
-from polyins.live.events import Epoch, GnssEpoch, ImuEpoch
-from polyins.live.starter import KEPT, Starter
 from polyins.model.methods import find_method
 from polyins.model.recording import Recording, StartOptions
 from polyins.navigate.choice import choose
+from polyins.navigate.samples import GnssFix, ImuSample, Sample
+from polyins.navigate.starter import KEPT, Starter
 from polyins.prepare.alignment import Start
 
 DELAY = 0.5
 
 
 def begun(
-    blank: Recording, epochs: list[Epoch], needs_fix: bool = True, method: str = "enav-fusion"
-) -> tuple[Starter, Start | None, list[Epoch]]:
+    blank: Recording, samples: list[Sample], needs_fix: bool = True, method: str = "enav-fusion"
+) -> tuple[Starter, Start | None, list[Sample]]:
     starter = Starter(replace(blank, imus=(), gnss=None), DELAY, needs_fix, method)
-    for k, epoch in enumerate(epochs):
-        found = starter.take(epoch)
+    for k, sample in enumerate(samples):
+        found = starter.take(sample)
         if found:
-            return starter, found[0], [*found[1], *epochs[k + 1 :]]
+            return starter, found[0], [*found[1], *samples[k + 1 :]]
     return starter, None, []
 
 
@@ -34,22 +34,22 @@ def assert_same(a: Start, b: Start) -> None:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
-def test_what_was_collected_is_handed_on_in_order(recording: Recording, epochs: list[Epoch]) -> None:
-    _, start, all_of_them = begun(recording, epochs)
+def test_what_was_collected_is_handed_on_in_order(recording: Recording, samples: list[Sample]) -> None:
+    _, start, all_of_them = begun(recording, samples)
     assert start is not None
     assert start.time < 9.0
-    assert [e.time for e in all_of_them] == [e.time for e in epochs]
-    for sent, handed in zip(epochs, all_of_them, strict=True):
+    assert [e.time for e in all_of_them] == [e.time for e in samples]
+    for sent, handed in zip(samples, all_of_them, strict=True):
         assert type(sent) is type(handed)
-    by_name = [e for e in all_of_them if isinstance(e, ImuEpoch) and e.imu == "imu2"]
+    by_name = [e for e in all_of_them if isinstance(e, ImuSample) and e.imu == "imu2"]
     np.testing.assert_array_equal([e.dvel for e in by_name], recording.imus[1].dvel)
 
 
-def test_late_and_double_epochs_change_nothing(recording: Recording, epochs: list[Epoch]) -> None:
-    _, start, _ = begun(recording, epochs)
+def test_late_and_double_epochs_change_nothing(recording: Recording, samples: list[Sample]) -> None:
+    _, start, _ = begun(recording, samples)
     chance = random.Random(1)
-    late = sorted(epochs, key=lambda e: e.time + chance.uniform(0.0, 0.8 * DELAY))
-    double = [e for epoch in late for e in [epoch] * chance.choice([1, 2])]
+    late = sorted(samples, key=lambda e: e.time + chance.uniform(0.0, 0.8 * DELAY))
+    double = [e for sample in late for e in [sample] * chance.choice([1, 2])]
     starter, again, _ = begun(recording, double)
     assert start is not None
     assert again is not None
@@ -57,7 +57,7 @@ def test_late_and_double_epochs_change_nothing(recording: Recording, epochs: lis
     assert starter.counts["duplicated"] > 100
 
 
-def test_a_start_given_fully_needs_no_motion(recording: Recording, epochs: list[Epoch]) -> None:
+def test_a_start_given_fully_needs_no_motion(recording: Recording, samples: list[Sample]) -> None:
     given = StartOptions(
         position=recording.gnss.position[0],
         velocity=np.zeros(3),
@@ -66,35 +66,35 @@ def test_a_start_given_fully_needs_no_motion(recording: Recording, epochs: list[
         heading_from="value",
         estimate_gyro_bias=False,
     )
-    _, start, rest = begun(replace(recording, start=given), epochs)
+    _, start, rest = begun(replace(recording, start=given), samples)
     assert start is not None
     assert start.time == recording.imus[0].time[0]
-    assert len(rest) == len(epochs)
+    assert len(rest) == len(samples)
 
 
-def test_a_standstill_has_its_chance(recording: Recording, epochs: list[Epoch]) -> None:
-    _, start, _ = begun(replace(recording, start=StartOptions(heading=1.0)), epochs)
+def test_a_standstill_has_its_chance(recording: Recording, samples: list[Sample]) -> None:
+    _, start, _ = begun(replace(recording, start=StartOptions(heading=1.0)), samples)
     assert start is not None
     assert start.sources["standstill"].startswith("found: 0.0")
     # not before it is over: a longer one knows the gyros better
     assert 7.5 < start.time < 9.0
     interval = (0.02, 7.5)
-    _, start, _ = begun(replace(recording, start=StartOptions(heading=1.0, static_interval=interval)), epochs)
+    _, start, _ = begun(replace(recording, start=StartOptions(heading=1.0, static_interval=interval)), samples)
     assert start is not None
     assert start.sources["gyro_bias"] == "mean of 7.5 s at standstill"
 
 
-def test_it_says_what_is_missing(recording: Recording, epochs: list[Epoch]) -> None:
-    starter, start, _ = begun(recording, [e for e in epochs if isinstance(e, GnssEpoch) or e.imu != "imu3"])
+def test_it_says_what_is_missing(recording: Recording, samples: list[Sample]) -> None:
+    starter, start, _ = begun(recording, [e for e in samples if isinstance(e, GnssFix) or e.imu != "imu3"])
     assert start is None
     assert starter.why == "no data from imu3"
-    starter, start, _ = begun(recording, [e for e in epochs if isinstance(e, ImuEpoch)])
+    starter, start, _ = begun(recording, [e for e in samples if isinstance(e, ImuSample)])
     assert start is None
     assert "GNSS" in starter.why
-    starter, start, _ = begun(recording, [e for e in epochs if e.time < 6.0])
+    starter, start, _ = begun(recording, [e for e in samples if e.time < 6.0])
     assert start is None
     assert starter.why == "collecting data until 9 s"
-    starter, start, _ = begun(replace(recording, start=StartOptions()), [e for e in epochs if e.time < 7.0])
+    starter, start, _ = begun(replace(recording, start=StartOptions()), [e for e in samples if e.time < 7.0])
     assert start is None
     assert "heading" in starter.why
 
@@ -102,15 +102,15 @@ def test_it_says_what_is_missing(recording: Recording, epochs: list[Epoch]) -> N
 def test_waiting_does_not_fill_the_memory(recording: Recording) -> None:
     starter = Starter(replace(recording, imus=(), gnss=None), DELAY, needs_fix=True)
     for k in range(6000):
-        starter.take(ImuEpoch("imu1", k / 10, np.zeros(3), np.zeros(3)))
+        starter.take(ImuSample("imu1", k / 10, np.zeros(3), np.zeros(3)))
     rows = starter.imus["imu1"]
     assert len(rows.stamps) * rows.width == len(rows.numbers)
     assert len(rows.stamps) < 10 * (KEPT + 15.0)
 
 
-def epochs_of(recording: Recording) -> list[Epoch]:
-    found: list[Epoch] = [
-        ImuEpoch(stream.name, float(stream.time[k]), stream.dtheta[k], stream.dvel[k])
+def epochs_of(recording: Recording) -> list[Sample]:
+    found: list[Sample] = [
+        ImuSample(stream.name, float(stream.time[k]), stream.dtheta[k], stream.dvel[k])
         for stream in recording.imus
         for k in range(len(stream.time))
     ]
@@ -120,17 +120,17 @@ def epochs_of(recording: Recording) -> list[Epoch]:
     for k in range(len(gnss.time)):
         velocity = (gnss.velocity[k], gnss.velocity_std[k]) if given else (None, None)
         position, std = gnss.position[k], gnss.position_std[k]
-        found.append(GnssEpoch(float(gnss.time[k]), position, std, *velocity, geodetic=recording.geodetic))
-    return sorted(found, key=lambda epoch: epoch.time)
+        found.append(GnssFix(float(gnss.time[k]), position, std, *velocity, geodetic=recording.geodetic))
+    return sorted(found, key=lambda sample: sample.time)
 
 
 @pytest.mark.parametrize("method", ["single", "enav-fusion", "imu-fusion"])
 @pytest.mark.parametrize("start", [StartOptions(), StartOptions(heading=1.0)])
 def test_it_is_the_start_of_the_whole_recording(
-    recording: Recording, epochs: list[Epoch], method: str, start: StartOptions
+    recording: Recording, samples: list[Sample], method: str, start: StartOptions
 ) -> None:
     whole = replace(recording, start=start)
-    _, live, _ = begun(whole, epochs, method=method)
+    _, live, _ = begun(whole, samples, method=method)
     assert live is not None
     taken = [0] if method == "single" else list(range(len(whole.rig.imus)))
     assert_same(live.subset(taken), pi.find_start(whole, method))

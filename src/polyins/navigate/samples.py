@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class ImuEpoch(NamedTuple):
+class ImuSample(NamedTuple):
     """Increments of one IMU over the interval that ends at its stamp."""
 
     imu: str
@@ -23,7 +23,7 @@ class ImuEpoch(NamedTuple):
     """m/s, shape (3,)"""
 
 
-class GnssEpoch(NamedTuple):
+class GnssFix(NamedTuple):
     """A fix of the antenna."""
 
     time: float
@@ -41,7 +41,7 @@ class GnssEpoch(NamedTuple):
     """the height counts from the sea, not from the ellipsoid"""
 
 
-class SensorEpoch(NamedTuple):
+class SensorSample(NamedTuple):
     """What a sensor of height, heading or speed shows."""
 
     kind: str
@@ -54,8 +54,4 @@ class SensorEpoch(NamedTuple):
     """of the value, shape (1,); of an odometer forward, right and down, m/s, shape (3,), where zero is not measured"""
 
 
-Epoch = ImuEpoch | GnssEpoch | SensorEpoch
-
-
-class RefusedError(Exception):
-    """An epoch that cannot be used; the message is the kind under which it is counted."""
+Sample = ImuSample | GnssFix | SensorSample

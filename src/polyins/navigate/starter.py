@@ -1,4 +1,4 @@
-"""From nothing to a start: collect epochs until the search for a start succeeds on them."""
+"""From nothing to a start: collect samples until the search for a start succeeds on them."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.live.events import Array, Epoch, GnssEpoch, ImuEpoch, SensorEpoch
 from polyins.model.methods import find_method
 from polyins.model.recording import GnssStream, ImuStream, Recording
 from polyins.navigate import batch
 from polyins.navigate.choice import choose
+from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.start import same
 from polyins.prepare import course, timesync
 from polyins.prepare.alignment import Start
@@ -26,6 +26,8 @@ KEPT = 120.0
 """s of data that are kept: the longest standstill that is looked at, and as long again to move off"""
 SETTLED = 3.0
 """s of further data that leave a start as it is: then it is that of the whole recording"""
+BEFORE_START = 2.0
+"""s of data before the start, by which the navigator knows the rates of the IMUs"""
 CUT_EVERY = 10.0  # s
 
 
@@ -52,15 +54,17 @@ class _Rows:
 
 
 class Starter:
-    """Collects epochs until the search finds a start in them which further data do not change."""
+    """Collects samples until the search finds a start in them which further data do not change."""
 
-    def __init__(self, blank: Recording, delay: float, needs_fix: bool, method: str = "enav-fusion") -> None:
-        """`blank` says all but the streams; an epoch may be later than others by `delay`, s.
+    def __init__(
+        self, blank: Recording, delay: float, needs_fix: bool, method: str = "enav-fusion", imu: int = 0
+    ) -> None:
+        """`blank` says all but the streams; a sample may be later than others by `delay`, s.
 
-        `needs_fix`: the position is to come from GNSS. `method`: by which a vehicle finds its heading.
+        `needs_fix`: the position is to come from GNSS. `method`, `imu`: as for `Navigator`.
         """
         self.method = find_method(method)
-        self.taken = choose(self.method, blank.rig).all
+        self.taken = choose(self.method, blank.rig, imu).all
         self.found: tuple[float, Start] | None = None
         """when the start was first found, s, and it"""
         self.blank = blank
@@ -71,30 +75,30 @@ class Starter:
         """why there is no start yet"""
         self.imus = {imu.name: _Rows(7) for imu in blank.rig.imus}
         self.fixes = _Rows(13)
-        self.shown: list[SensorEpoch] = []
+        self.shown: list[SensorSample] = []
         """by sensors that say nothing of the start"""
         self.newest = float("-inf")
         self.attempt: float | None = None
         """s: data up to this time are looked at next"""
 
-    def take(self, epoch: Epoch) -> tuple[Start, list[Epoch]] | None:
-        """Take an epoch; returns the start, once it is found, and all that was collected in the order of stamps."""
-        if isinstance(epoch, SensorEpoch):
-            self.shown.append(epoch)
+    def take(self, sample: Sample) -> tuple[Start, list[Sample]] | None:
+        """Take a sample; returns the start, once it is found, and all that was collected in the order of stamps."""
+        if isinstance(sample, SensorSample):
+            self.shown.append(sample)
             return None
-        rows = self.imus[epoch.imu] if isinstance(epoch, ImuEpoch) else self.fixes
-        if epoch.time in rows.stamps:
+        rows = self.imus[sample.imu] if isinstance(sample, ImuSample) else self.fixes
+        if sample.time in rows.stamps:
             self.counts["duplicated"] += 1
             return None
-        if epoch.time < self.newest - self.delay:
+        if sample.time < self.newest - self.delay:
             self.counts["late"] += 1
             return None
-        self.newest = max(self.newest, epoch.time)
-        rows.add(*_row(epoch))
+        self.newest = max(self.newest, sample.time)
+        rows.add(*_row(sample))
         if self.attempt is None:
-            self.attempt = self._first_attempt(epoch.time)
+            self.attempt = self._first_attempt(sample.time)
             self.why = f"collecting data until {self.attempt:.0f} s"
-        if epoch.time < self.attempt + self.delay:
+        if sample.time < self.attempt + self.delay:
             return None
         until, self.attempt = self.attempt, self.attempt + EVERY
         start = self._settled(until)
@@ -103,10 +107,10 @@ class Starter:
         if until % CUT_EVERY == 0.0:
             for rows in (*self.imus.values(), self.fixes):
                 rows.cut(until - KEPT)
-            self.shown = [epoch for epoch in self.shown if epoch.time >= until - KEPT]
+            self.shown = [sample for sample in self.shown if sample.time >= until - KEPT]
         return None
 
-    def finish(self) -> tuple[Start, list[Epoch]] | None:
+    def finish(self) -> tuple[Start, list[Sample]] | None:
         """Return the start that the data have, now that there are no more, and all that was collected."""
         start = self._found(self.newest)
         return None if start is None else (start, self._collected())
@@ -175,27 +179,32 @@ class Starter:
         velocities = (rows[:, 7:10], rows[:, 10:13]) if np.isfinite(rows).all() else (None, None)
         return GnssStream(rows[:, 0], rows[:, 1:4], rows[:, 4:7], *velocities)
 
-    def _collected(self) -> list[Epoch]:
-        epochs: list[Epoch] = [*self.shown]
+    def _collected(self) -> list[Sample]:
+        samples: list[Sample] = [*self.shown]
         for name, collected in self.imus.items():
-            epochs += [ImuEpoch(name, float(row[0]), row[1:4], row[4:7]) for row in collected.sorted()]
+            samples += [ImuSample(name, float(row[0]), row[1:4], row[4:7]) for row in collected.sorted()]
         for row in self.fixes.sorted():
             velocity, velocity_std = (row[7:10], row[10:13]) if np.isfinite(row).all() else (None, None)
-            fix = GnssEpoch(float(row[0]), row[1:4], row[4:7], velocity, velocity_std, geodetic=self.blank.geodetic)
-            epochs.append(fix)
-        return sorted(epochs, key=lambda epoch: epoch.time)
+            fix = GnssFix(float(row[0]), row[1:4], row[4:7], velocity, velocity_std, geodetic=self.blank.geodetic)
+            samples.append(fix)
+        return sorted(samples, key=lambda sample: sample.time)
 
 
-def _row(epoch: ImuEpoch | GnssEpoch) -> tuple[float, ...]:
-    if isinstance(epoch, ImuEpoch):
-        return epoch.time, *epoch.dtheta, *epoch.dvel
-    assert epoch.position_std is not None
+def _row(sample: ImuSample | GnssFix) -> tuple[float, ...]:
+    if isinstance(sample, ImuSample):
+        return sample.time, *sample.dtheta, *sample.dvel
+    assert sample.position_std is not None
     nothing = np.full(3, np.nan)
-    velocity = nothing if epoch.velocity is None else epoch.velocity
-    velocity_std = nothing if epoch.velocity_std is None else epoch.velocity_std
-    return epoch.time, *epoch.position, *epoch.position_std, *velocity, *velocity_std
+    velocity = nothing if sample.velocity is None else sample.velocity
+    velocity_std = nothing if sample.velocity_std is None else sample.velocity_std
+    return sample.time, *sample.position, *sample.position_std, *velocity, *velocity_std
 
 
 def _until(rows: _Rows, time: float) -> Array:
     found = rows.sorted()
     return found[found[:, 0] <= time]
+
+
+def after_start(start: Start, collected: list[Sample]) -> list[Sample]:
+    """Return what a navigator is to be given of the collected samples: what came earlier is in the start."""
+    return [one for one in collected if one.time > start.time - (BEFORE_START if isinstance(one, ImuSample) else 0.0)]
