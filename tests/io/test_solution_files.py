@@ -47,7 +47,7 @@ def test_values_in_the_files_are_in_the_units_of_their_names(tmp_path):
     write_solution(solution(truth), tmp_path)
     table = pq.read_table(tmp_path / SOLUTION).to_pydict()
     np.testing.assert_allclose(table["latitude_deg"][0], 30.5)
-    np.testing.assert_allclose(table["heading_deg"], np.degrees(truth.euler[:, 2]) % 360.0, atol=1e-9)
+    np.testing.assert_allclose(table["heading_deg"], np.degrees(truth.euler[:, 2]) % 360.0, atol=2e-5)
     np.testing.assert_allclose(table["std_phi_down_deg"], np.degrees(0.01))
     np.testing.assert_allclose(table["std_pitch_deg"], np.degrees(0.01))
     np.testing.assert_allclose(table["std_roll_deg"], np.degrees(0.01) / np.cos(0.05))
@@ -65,8 +65,8 @@ def test_a_local_solution_has_no_latitude_and_starts_at_zero(tmp_path):
     assert table.column("latitude_deg").null_count == truth.time.size
     assert table.column("longitude_deg").null_count == truth.time.size
     assert table.column("north_m")[0].as_py() == 0.0
-    np.testing.assert_allclose(table.column("east_m").to_numpy(), truth.local[:, 1], atol=1e-9)
-    np.testing.assert_allclose(read_solution(tmp_path).position, shifted, atol=1e-9)
+    np.testing.assert_allclose(table.column("east_m").to_numpy(), truth.local[:, 1], rtol=1e-7, atol=1e-5)
+    np.testing.assert_allclose(read_solution(tmp_path).position, shifted, rtol=1e-7, atol=1e-5)
 
 
 @pytest.mark.parametrize("geodetic", [True, False])
@@ -79,14 +79,17 @@ def test_what_was_written_is_read_again(geodetic, tmp_path):
     for source in (tmp_path, tmp_path / SOLUTION):
         back = read_solution(source)
         assert (back.method, back.geodetic, back.imu_names) == ("enav-fusion", geodetic, original.imu_names)
-        np.testing.assert_allclose(back.position[:, :2], original.position[:, :2], rtol=0.0, atol=1e-12)
+        metres = 1e-12 if geodetic else 1e-5
+        np.testing.assert_allclose(back.position[:, :2], original.position[:, :2], rtol=0.0, atol=metres)
         np.testing.assert_array_equal(back.position[:, 2], original.position[:, 2])
-        for field in ("time", "velocity", "imu_errors", "imu_error_time", "point"):
+        for field in ("time", "imu_error_time", "point"):
             np.testing.assert_array_equal(getattr(back, field), getattr(original, field))
+        for field in ("velocity", "imu_errors"):
+            np.testing.assert_array_equal(getattr(back, field), getattr(original, field).astype(np.float32))
         sign = np.sign(np.sum(back.attitude * original.attitude, axis=1, keepdims=True))
-        np.testing.assert_allclose(back.attitude * sign, original.attitude, atol=1e-14)
-        np.testing.assert_allclose(back.position_variance, original.position_variance, rtol=1e-14)
-        np.testing.assert_allclose(back.phi_covariance, original.phi_covariance, rtol=1e-13, atol=0.0)
+        np.testing.assert_allclose(back.attitude * sign, original.attitude, atol=3e-7)
+        np.testing.assert_allclose(back.position_variance, original.position_variance, rtol=3e-7)
+        np.testing.assert_allclose(back.phi_covariance, original.phi_covariance, rtol=3e-7, atol=0.0)
         assert back.filter_s == original.filter_s
         assert back.warnings == ()
 
@@ -95,7 +98,7 @@ def test_a_solution_read_again_is_judged_alike(drifted, tmp_path):
     write_solution(drifted, tmp_path)
     truth = reference(drive(), lever_arm=np.array([1.0, 0.5, -0.2]))
     ours, theirs = (summarize(one, truth)["reference"] for one in (drifted, read_solution(tmp_path)))
-    assert ours == pytest.approx(theirs, abs=1e-7)
+    assert ours == pytest.approx(theirs, abs=1e-5)
 
 
 def test_a_file_without_our_notes_is_read_with_a_warning(drifted, tmp_path):

@@ -18,7 +18,7 @@ from polyins.formats.documents import plain
 from polyins.model.attitude import euler_angles, euler_variance, quaternions
 from polyins.model.geodesy import displacement
 from polyins.model.recording import usual_interval
-from polyins.model.solution import Solution
+from polyins.model.solution import Solution, Trajectory
 from polyins.version import __version__
 
 if TYPE_CHECKING:
@@ -82,7 +82,8 @@ class SolutionWriter:
             self._origin, self._begin = part.position[0], part.time[0]
         trajectory, errors = self._files
         rows = self._rows(part.time)
-        trajectory.add(_columns(part if rows is None else part.at(rows, np.arange(0)), self._origin))
+        shown = part if rows is None else part.at(rows, np.arange(0))
+        trajectory.add(trajectory_columns(shown.trajectory, self._origin, part.geodetic))
         errors.add(_imu_error_columns(part))
 
     def _rows(self, time: Array) -> NDArray[np.intp] | None:
@@ -143,27 +144,32 @@ def read_solution(path: Path) -> Solution:
     )
 
 
-def _columns(solution: Solution, origin: Array) -> dict[str, Array | None]:
-    euler = euler_angles(solution.attitude)
-    euler_std = np.degrees(np.sqrt(euler_variance(euler, solution.phi_covariance)))
+def trajectory_columns(of: Trajectory, origin: Array, geodetic: bool) -> dict[str, Array | None]:
+    """Return the columns of `solution.parquet`; None: not known on a local plane. `origin`: metres count from there."""
+    euler = euler_angles(of.attitude)
+    euler_std = np.degrees(np.sqrt(euler_variance(euler, of.phi_covariance)))
     degrees = np.degrees(euler)
     degrees[:, 2] %= 360.0
-    latitude, longitude = np.degrees(solution.position[:, :2]).T if solution.geodetic else (None, None)
-    local = displacement(solution.position, origin, solution.geodetic)
-    phi_std = np.degrees(np.sqrt(solution.phi_covariance[:, [0, 3, 5]]))
+    latitude, longitude = np.degrees(of.position[:, :2]).T if geodetic else (None, None)
     return {
-        "time_s": solution.time,
+        "time_s": of.time,
         "latitude_deg": latitude,
         "longitude_deg": longitude,
-        "height_m": solution.position[:, 2],
-        **_named(_VELOCITY, solution.velocity),
+        "height_m": of.position[:, 2],
+        **_named(_VELOCITY, of.velocity),
         **_named(_EULER, degrees),
-        **_named(_POSITION_STD, np.sqrt(solution.position_variance)),
-        **_named(_VELOCITY_STD, np.sqrt(solution.velocity_variance)),
+        **_named(_POSITION_STD, np.sqrt(of.position_variance)),
+        **_named(_VELOCITY_STD, np.sqrt(of.velocity_variance)),
         **_named(tuple(f"std_{name}" for name in _EULER), euler_std),
-        **_named(_PHI_STD, phi_std),
-        **_named(_LOCAL, local),
+        **_named(_PHI_STD, np.degrees(np.sqrt(of.phi_covariance[:, [0, 3, 5]]))),
+        **_named(_LOCAL, displacement(of.position, origin, geodetic)),
     }
+
+
+def arrow_columns(columns: Mapping[str, Any]) -> dict[str, pa.Array]:
+    """Return columns as they are written: in single precision but for what that would round too much."""
+    rows = len(columns["time_s"])
+    return {name: _arrow(name, values, rows) for name, values in columns.items()}
 
 
 def _named(names: tuple[str, ...], values: Array) -> dict[str, Array]:
@@ -208,8 +214,7 @@ class _Table:
     def add(self, columns: Mapping[str, Any]) -> None:
         import pyarrow as pa
 
-        rows = len(columns["time_s"])
-        table = pa.table({name: _arrow(name, values, rows) for name, values in columns.items()})
+        table = pa.table(arrow_columns(columns))
         if self._writer is None:
             self._writer = self._stack.enter_context(_parquet_writer(self._beside, table.schema))
         self._writer.write_table(table)

@@ -6,10 +6,10 @@ import numpy as np
 
 from polyins.config import Config
 from polyins.live.source import RefusedError
-from polyins.model.geodesy import displacement
-from polyins.model.rig import DEG, Rig
+from polyins.model.rig import Rig
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.reading import sensor_stream
+from polyins.reading.position_stream import height_shift, on_plane
 
 
 class Intake:
@@ -61,18 +61,16 @@ class Intake:
 
     def _above_ellipsoid(self, fix: GnssFix) -> Array:
         assert self.gnss is not None
-        if not fix.geodetic or not (fix.above_sea or self.gnss.height == "sea-level"):
-            return fix.position
-        if self.gnss.geoid_height_m is None:
+        shift = height_shift(self.gnss, fix.geodetic, fix.above_sea)
+        if shift is None:
             raise RefusedError("height above the sea without geoid_height_m")
-        return np.asarray(fix.position + np.array([0.0, 0.0, self.gnss.geoid_height_m]))
+        return np.asarray(fix.position + np.array([0.0, 0.0, shift]))
 
     def _placed(self, position: Array, geodetic: bool) -> Array:
         """Return the position in the kind that the filter has."""
         origin = None if self.gnss is None else self.gnss.plane_origin
         if geodetic and origin is not None:
-            point = np.array([origin.latitude_deg * DEG, origin.longitude_deg * DEG, origin.height_m])
-            return np.asarray(displacement(position[None, :], point, True)[0] * [1.0, 1.0, -1.0])
+            return np.asarray(on_plane(position[None, :], origin)[0])
         if geodetic != self.geodetic:
             raise RefusedError("position of another kind")
         return position

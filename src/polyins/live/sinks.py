@@ -16,6 +16,7 @@ from urllib.parse import SplitResult, parse_qs, urlsplit
 
 from polyins.errors import InputError
 from polyins.files import whole
+from polyins.formats.solution_files import arrow_columns
 from polyins.live import nmea
 from polyins.live.snapshot import Snapshot, columns
 from polyins.live.source import address
@@ -172,8 +173,7 @@ class ParquetLog:
 
         first = self.pending[0]
         values = columns([snapshot.state for snapshot in self.pending], first.origin, first.geodetic)
-        rows = len(self.pending)
-        arrays = {name: pa.nulls(rows, pa.float64()) if v is None else pa.array(v) for name, v in values.items()}
+        arrays = arrow_columns(values)
         arrays["dead_reckoning"] = pa.array([snapshot.dead_reckoning for snapshot in self.pending])
         table = pa.table(arrays)
         if self.writer is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,15 +69,26 @@ class OffsetEstimate:
     """shape (K,)"""
 
 
-BY_EPOCH = (
-    "time",
-    "position",
-    "velocity",
-    "attitude",
-    "position_variance",
-    "velocity_variance",
-    "phi_covariance",
-)
+class Trajectory(NamedTuple):
+    """The states of T epochs and how sure they are."""
+
+    time: Array
+    """s, shape (T,)"""
+    position: Array
+    """(latitude rad, longitude rad, height m), or (north m, east m, height m) on a local plane, shape (T, 3)"""
+    velocity: Array
+    """m/s north, east, down, shape (T, 3)"""
+    attitude: Array
+    """q_nb, scalar first, shape (T, 4)"""
+    position_variance: Array
+    """m^2 north, east, down, shape (T, 3)"""
+    velocity_variance: Array
+    """m^2/s^2, shape (T, 3)"""
+    phi_covariance: Array
+    """rad^2: NN, NE, ND, EE, ED, DD of the attitude error phi, shape (T, 6)"""
+
+
+BY_EPOCH = Trajectory._fields
 BY_LOG = ("imu_error_time", "imu_errors", "imu_error_std")
 
 
@@ -131,6 +142,11 @@ class Solution:
     first_call_s: float = 0.0
     """time spent on compiling or loading the kernels"""
     warnings: tuple[str, ...] = ()
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """What has a row per epoch."""
+        return Trajectory(*(getattr(self, name) for name in BY_EPOCH))
 
     def at(self, epochs: NDArray[np.intp], logs: NDArray[np.intp]) -> Solution:
         """Return the solution at some of its epochs, with some rows of the log; measurements stay."""

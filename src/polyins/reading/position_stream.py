@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.checks import stream_checks
-from polyins.config import GnssEntry, ReferenceEntry
+from polyins.config import GeodeticPoint, GnssEntry, ReferenceEntry
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.files import find_named
@@ -41,19 +41,26 @@ def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) 
 
 def _above_ellipsoid(track: Track, entry: GnssEntry | ReferenceEntry, section: str, document: Document) -> Track:
     """Convert heights above the sea, or refuse them."""
-    if entry.height == "ellipsoidal" and not track.above_sea:
-        return track
-    if entry.height == "ellipsoidal":
+    if entry.height == "ellipsoidal" and track.above_sea:
         place = document.place([section, "height"])
         raise InputError(f"{place}: heights in {track.source.path} are above the sea; expected height: sea-level")
-    if not track.geodetic:
-        return track
-    if entry.geoid_height_m is None:
+    shift = height_shift(entry, track.geodetic, track.above_sea)
+    if shift is None:
         raise InputError(
             f"{document.place([section, 'height'])}: sea-level heights need geoid_height_m; expected the height of the "
             "geoid above the ellipsoid at the place, m"
         )
-    return replace(track, position=track.position + np.array([0.0, 0.0, entry.geoid_height_m]))
+    return track if shift == 0.0 else replace(track, position=track.position + np.array([0.0, 0.0, shift]))
+
+
+def height_shift(entry: GnssEntry | ReferenceEntry, geodetic: bool, above_sea: bool) -> float | None:
+    """Return what to add to heights to have them above the ellipsoid, m; None: it is not known.
+
+    `geodetic`: the positions are; `above_sea`: whoever gives them says so, else the configuration may.
+    """
+    if not geodetic or not (above_sea or entry.height == "sea-level"):
+        return 0.0
+    return entry.geoid_height_m
 
 
 def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStream, bool, list[str]]:
@@ -70,7 +77,7 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         raise InputError(f"{place}: {track.source.path} has no position std; expected position_std_m")
     stream_checks.check_std(track.source, std)
     warnings += stream_checks.check_within(track.source, "GNSS", track.time, span)
-    track = _on_plane(track, entry, document)
+    track = _converted(track, entry, document)
     kept = thinned(track.time, entry.rate_hz) if entry.rate_hz else np.arange(len(track.time))
     velocity = track.velocity if track.velocity_std is not None else None
     if track.velocity is not None and velocity is None:
@@ -85,7 +92,7 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
     return stream, track.geodetic, warnings
 
 
-def _on_plane(track: Track, entry: GnssEntry, document: Document) -> Track:
+def _converted(track: Track, entry: GnssEntry, document: Document) -> Track:
     """Convert geodetic positions to a local plane, if the entry gives its origin."""
     origin = entry.plane_origin
     if origin is None:
@@ -93,8 +100,13 @@ def _on_plane(track: Track, entry: GnssEntry, document: Document) -> Track:
     if not track.geodetic:
         place = document.place(["gnss", "plane_origin"])
         raise InputError(f"{place}: given for positions in metres; expected it with latitude and longitude only")
+    return replace(track, position=on_plane(track.position, origin), geodetic=False)
+
+
+def on_plane(position: Array, origin: GeodeticPoint) -> Array:
+    """Return geodetic positions, (M, 3), as north, east and height from an origin, m."""
     point = np.array([origin.latitude_deg * DEG, origin.longitude_deg * DEG, origin.height_m])
-    return replace(track, position=displacement(track.position, point, True) * [1.0, 1.0, -1.0], geodetic=False)
+    return np.asarray(displacement(position, point, True) * [1.0, 1.0, -1.0])
 
 
 def thinned(time: Array, rate_hz: float) -> NDArray[np.intp]:
