@@ -1,9 +1,11 @@
-"""Memory and time of a long recording: made stretch by stretch, run by the command line, peak memory measured.
+"""Memory and time of whole commands over long recordings, which are made first, stretch by stretch.
 
-    python benchmarks/long_recording.py --hours 1 --hours 4 [--imus 16] [--folder DIR] [--keep]
+    python benchmarks/long_recording.py [--hours 24] [--only run,compare,wheels,csv] [--folder DIR] [--keep]
 
-An array on a vehicle that drives a circle at constant speed on a local plane, so that increments are exact and alike
-all day; white noise on every axis. 24 h of 16 IMUs at 200 Hz take 15.5 GB of disk while this runs.
+`run` takes 16 IMUs for so many hours; `compare` two methods and 16 IMUs, `wheels` a vehicle with two wheels and a
+body IMU, `csv` four IMUs in text, each for a quarter of that. The array drives a circle at constant speed on a local
+plane, so that increments are exact and alike all day; the vehicle stands. White noise on every axis. 24 h of 16 IMUs at
+200 Hz take 15.5 GB of disk while this runs.
 """
 
 from __future__ import annotations
@@ -17,11 +19,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pyarrow import csv
 
 from polyins.formats.table import IMU_NAMES, LOCAL_NAMES, STD_NAMES
 from polyins.tools.bench import machine
@@ -33,6 +38,11 @@ NOISE = np.array(3 * [4e-6] + 3 * [4e-4])
 """std of an increment: rad, m/s"""
 ROWS = 120_000
 """of a row group"""
+START: dict[str, Any] = {
+    "position": {"north_m": 0.0, "east_m": 0.0, "height_m": 0.0},
+    "heading_deg": 0.0,
+    "heading_from": "value",
+}
 
 
 def positions(count: int) -> np.ndarray:
@@ -42,17 +52,27 @@ def positions(count: int) -> np.ndarray:
     return np.array(places) - np.mean(places, axis=0)
 
 
-def write_imu(path: Path, rows: int, position: np.ndarray, seed: int) -> None:
-    """Write increments: turn about down, centripetal force to the right, gravity, at the IMU's own place."""
+def on_circle(position: np.ndarray) -> np.ndarray:
+    """Return rate and force at a place: turn about down, centripetal force to the right, gravity."""
+    return np.array([0.0, 0.0, TURN, -(TURN**2) * position[0], TURN * SPEED - TURN**2 * position[1], -GRAVITY])
+
+
+def write_imu(path: Path, rows: int, exact: np.ndarray, seed: int) -> None:
+    """Write increments of a constant rate and force."""
     rng = np.random.default_rng(seed)
-    force = np.array([-(TURN**2) * position[0], TURN * SPEED - TURN**2 * position[1], -GRAVITY])
-    exact = np.array([0.0, 0.0, TURN, *force]) / RATE_HZ
     schema = pa.schema([(name, pa.float64()) for name in IMU_NAMES])
-    with pq.ParquetWriter(path, schema, compression="none", use_dictionary=False) as writer:
+    with opened(path, schema) as writer:
         for first in range(0, rows, ROWS):
             stamps = np.arange(first, min(first + ROWS, rows)) / RATE_HZ
-            values = exact + NOISE * rng.standard_normal((len(stamps), 6))
+            values = exact / RATE_HZ + NOISE * rng.standard_normal((len(stamps), 6))
             writer.write_table(pa.table([pa.array(column) for column in [stamps, *values.T]], schema=schema))
+
+
+def opened(path: Path, schema: pa.Schema) -> Any:
+    """Open a table, text or Parquet by its suffix."""
+    if path.suffix == ".csv":
+        return csv.CSVWriter(path, schema)
+    return pq.ParquetWriter(path, schema, compression="none", use_dictionary=False)
 
 
 def write_track(path: Path, time: np.ndarray, noise: float, seed: int) -> None:
@@ -64,14 +84,14 @@ def write_track(path: Path, time: np.ndarray, noise: float, seed: int) -> None:
     pq.write_table(pa.table(columns, names=["time_s", *LOCAL_NAMES, *STD_NAMES]), path)
 
 
-def write_recording(folder: Path, hours: float, imus: int) -> Path:
-    """Write a recording and return its configuration."""
+def write_array(folder: Path, hours: float, imus: int, suffix: str = ".parquet") -> Path:
+    """Write an array that drives and return its configuration."""
     folder.mkdir(parents=True, exist_ok=True)
     rows = round(3600.0 * hours * RATE_HZ)
     entries = []
     for number, position in enumerate(positions(imus), 1):
-        write_imu(folder / f"imu{number}.parquet", rows, position, number)
-        entries.append({"name": f"imu{number}", "file": f"imu{number}.parquet", "position_m": position.tolist()})
+        write_imu(folder / f"imu{number}{suffix}", rows, on_circle(position), number)
+        entries.append({"name": f"imu{number}", "file": f"imu{number}{suffix}", "position_m": position.tolist()})
     seconds = np.arange(1.0, rows / RATE_HZ)
     write_track(folder / "gnss.parquet", seconds, 0.05, 100)
     write_track(folder / "reference.parquet", seconds, 0.0, 101)
@@ -80,41 +100,66 @@ def write_recording(folder: Path, hours: float, imus: int) -> Path:
         "imus": entries,
         "gnss": {"file": "gnss.parquet"},
         "reference": {"file": "reference.parquet"},
-        "start": {
-            "time_s": 0.0,
-            "position": {"north_m": 0.0, "east_m": 0.0, "height_m": 0.0},
-            "velocity_m_s": [SPEED, 0.0, 0.0],
-            "roll_pitch_deg": [0.0, 0.0],
-            "heading_deg": 0.0,
-            "heading_from": "value",
-            "estimate_gyro_bias": False,
-        },
+        "start": {**START, "time_s": 0.0, "velocity_m_s": [SPEED, 0.0, 0.0], "roll_pitch_deg": [0.0, 0.0]},
         "outages": {"length_s": 30.0, "every_s": 300.0},
     }
+    config["start"]["estimate_gyro_bias"] = False
+    return written(folder, config)
+
+
+def write_vehicle(folder: Path, hours: float) -> Path:
+    """Write a vehicle that stands, and return its configuration."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = round(3600.0 * hours * RATE_HZ)
+    entries = []
+    for number, (name, right) in enumerate({"left": -0.4, "right": 0.4, "body": 0.0}.items()):
+        write_imu(folder / f"{name}.parquet", rows, np.array([0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY]), number)
+        entries.append({"name": name, "file": f"{name}.parquet", "position_m": [0.0, right, 0.0]})
+        if name != "body":
+            entries[-1]["wheel"] = {"radius_m": 0.25, "spin_axis": "x"}
+    config = {"imu_defaults": {"noise": {"grade": "consumer-mems"}}, "imus": entries, "start": START}
+    return written(folder, config)
+
+
+def written(folder: Path, config: dict[str, Any]) -> Path:
+    """Write a configuration and return its path."""
     path = folder / "long.yaml"
     path.write_text(json.dumps(config, indent=1))
     return path
 
 
-def measure(config: Path, out: Path) -> dict[str, object]:
+CASES: dict[str, tuple[float, Callable[[Path, float], Path], tuple[str, ...]]] = {
+    "run": (1.0, lambda folder, hours: write_array(folder, hours, 16), ("run",)),
+    "compare": (
+        0.25,
+        lambda folder, hours: write_array(folder, hours, 16),
+        ("compare", "--methods", "nav-fusion,enav-fusion"),
+    ),
+    "wheels": (0.25, write_vehicle, ("run", "--method", "triple-ins")),
+    "csv": (0.25, lambda folder, hours: write_array(folder, hours, 4, ".csv"), ("run",)),
+}
+"""share of the hours, what writes the recording, the command"""
+
+
+def measure(command: tuple[str, ...], config: Path, out: Path) -> dict[str, object]:
     """Run the command in a process of its own; return its figures."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begin = time.perf_counter()
-    command = [sys.executable, "-c", CHILD, "run", str(config), "--out", str(out), "--no-report", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    arguments = [sys.executable, "-c", CHILD, *command, str(config), "--out", str(out), "--json"]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(done.stderr)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     summary = json.loads(done.stdout)
     return {
-        "epochs": summary["epochs"],
         "peak_mb": float(done.stderr.split()[-1]) / 1024.0,
         "wall_s": time.perf_counter() - begin,
         "user_s": after.ru_utime - before.ru_utime,
         "system_s": after.ru_stime - before.ru_stime,
-        "filter_s": summary["filter_s"],
-        "solution_mb": (out / "solution.parquet").stat().st_size / 1e6,
-        "reference": summary["reference"],
+        "output_mb": sum(file.stat().st_size for file in out.rglob("*") if file.is_file()) / 1e6,
+        "epochs": summary.get("epochs"),
+        "filter_s": summary.get("filter_s"),
+        "reference": summary.get("reference"),
     }
 
 
@@ -131,23 +176,26 @@ finally:
 def main() -> None:
     """Print one JSON document."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--hours", type=float, action="append", required=True)
-    parser.add_argument("--imus", type=int, default=16)
+    parser.add_argument("--hours", type=float, default=24.0)
+    parser.add_argument("--only", default=",".join(CASES))
     parser.add_argument("--folder", type=Path, default=None, help="on a disk with room; a temporary one unless given")
     parser.add_argument("--keep", action="store_true", help="leave the recordings there")
     options = parser.parse_args()
     base = Path(tempfile.mkdtemp(prefix="polyins-long-", dir=options.folder))
-    runs = []
-    for hours in options.hours:
-        folder = base / f"{hours:g}h"
-        config = write_recording(folder, hours, options.imus)
+    runs = {}
+    for name in options.only.split(","):
+        share, write, command = CASES[name]
+        folder, hours = base / name, share * options.hours
+        config = write(folder, hours)
         size = sum(file.stat().st_size for file in folder.iterdir())
-        runs.append({"hours": hours, "recording_mb": size / 1e6, **measure(config, folder / "out")})
+        figures = measure(command, config, folder / "out")
+        runs[name] = {"hours": hours, "recording_mb": size / 1e6, **figures}
+        print(name, json.dumps(runs[name]), file=sys.stderr, flush=True)
         if not options.keep:
             shutil.rmtree(folder)
     if not options.keep:
         base.rmdir()
-    print(json.dumps({"machine": machine(), "imus": options.imus, "rate_hz": RATE_HZ, "runs": runs}, indent=2))
+    print(json.dumps({"machine": machine(), "rate_hz": RATE_HZ, "runs": runs}, indent=2))
 
 
 if __name__ == "__main__":

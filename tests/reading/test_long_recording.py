@@ -184,17 +184,38 @@ def test_a_row_that_is_no_number_is_named_and_leaves_no_file(simulated, tmp_path
     dvel[25_000, 1] = np.nan
     broken = replace(simulated, imus=(simulated.imus[0], replace(stream, dvel=dvel), simulated.imus[2]))
     config = files.write(broken, tmp_path / "recording")
-    long = opened_late(config)
     with pytest.raises(InputError, match=r"imu2.parquet, row 25001: accel is missing"):
-        navigation.run(long, folders={tmp_path / "out": None}, stretch_s=20.0)
-    assert not list((tmp_path / "out").iterdir())
+        opened(config)
 
 
-def opened_late(config: Path) -> LongRecording:
-    """Open a recording of whose beginning only a part is looked at."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(long_recording, "HEAD_S", 60.0)
-        return opened(config)
+def test_rows_that_a_chip_repeats_are_left_out_as_in_memory(simulated, tmp_path, monkeypatch):
+    stream = simulated.imus[1]
+    dtheta, dvel = stream.dtheta.copy(), stream.dvel.copy()
+    for first, last in ((15_000, 15_400), (16_300, 16_700), (20_000, 20_003)):
+        dtheta[first:last], dvel[first:last] = dtheta[first], dvel[first]
+    frozen = replace(stream, dtheta=dtheta, dvel=dvel)
+    config = files.write(replace(simulated, imus=(simulated.imus[0], frozen, simulated.imus[2])), tmp_path / "r")
+    monkeypatch.setattr(columns, "PIECE_ROWS", 16_384)
+    recording = pi.load(config)
+    assert len(recording.imus[1].time) < len(stream.time) - 790
+    solution = pi.run(recording)
+    write_solution(solution, tmp_path / "whole")
+    long = opened(config)
+    assert sum("repeats the same values" in warning for warning in long.head.warnings) >= 2
+    navigation.run(long, folders={tmp_path / "parts": None}, stretch_s=13.7)
+    same(tmp_path / "whole", tmp_path / "parts")
+
+
+def test_a_start_late_in_the_recording_is_found(simulated, tmp_path, monkeypatch):
+    """At 85 s the array drives; its heading is that of its course."""
+    monkeypatch.setattr(long_recording, "HEAD_S", 60.0)
+    monkeypatch.setattr(long_recording, "HEAD_ROWS", 10_000)
+    start = replace(simulated.start, time=85.0, heading_from="auto", heading=None)
+    config = files.write(replace(simulated, start=start), tmp_path / "recording")
+    agree(config, tmp_path, "enav-fusion")
+    monkeypatch.setattr(long_recording, "MOST_HEAD_ROWS", 20_000)
+    with pytest.raises(InputError, match=r"start.time_s: is late in a recording this long"):
+        opened(config)
 
 
 def test_stamps_that_go_back_are_refused_before_anything_runs(simulated, tmp_path):

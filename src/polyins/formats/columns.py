@@ -26,7 +26,7 @@ PIECE_ROWS = max(16_384, USUAL_OF + 1)
 """of a Parquet file read in order"""
 PIECE_BYTES = 1 << 21
 """of a text read in order"""
-BUFFER_BYTES = 1 << 18
+BUFFER_BYTES = 1 << 16
 """of a column; without it a whole row group would be held"""
 
 

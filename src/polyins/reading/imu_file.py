@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,9 @@ from polyins.model.recording import Array, ImuStream, usual_interval
 from polyins.prepare.timesync import gaps_of
 from polyins.reading.imu_stream import in_array_axes
 
+CONTEXT = 64
+"""rows before each piece that say what repeats and where an interval begins"""
+
 Pieces = Callable[[str, Sequence[Column]], Iterator[tuple[Source, list[Array]]]]
 
 
@@ -37,6 +40,8 @@ class StreamExtent:
     """the last stamp before and the first after each"""
     interval: float
     """the usual one, s"""
+    warnings: tuple[str, ...] = ()
+    """of rows that the chip did not measure"""
 
 
 class ImuFile:
@@ -49,48 +54,49 @@ class ImuFile:
         self._cells = table.imu_cells(self.columns, entry.rate_hz)
 
     def extent(self) -> StreamExtent:
-        """Read the stamps alone; raise InputError where they do not increase."""
+        """Read all rows for their stamps; raise InputError where they do not increase or values are no numbers."""
         first, last, rows, usual = np.nan, np.nan, 0, np.nan
         gaps: list[tuple[float, float]] = []
-        for source, time in self._stamps():
+        warnings: list[str] = []
+        for fresh, texts in self._rows():
+            time = fresh.time + self.entry.clock_offset_s
+            warnings += texts
+            if not len(time):
+                continue
             if not rows:
                 first, usual = time[0], usual_interval(time) if len(time) > 1 else np.nan
-            known = time if not rows else np.concatenate([[last], time])
-            row = (0 if source.first_line else rows) - (len(known) - len(time))
-            stream_checks.check_finite(source, {"time": known}, row)
-            stream_checks.check_order(source, known, first_row=row)
-            gaps += gaps_of(known, usual)
+            gaps += gaps_of(time if not rows else np.concatenate([[last], time]), usual)
             rows, last = rows + len(time), time[-1]
         if rows < 2:
             raise InputError(f"{self.source.path}: {rows} row(s); expected at least 2")
-        return StreamExtent(float(first), float(last), rows, tuple(gaps), float(usual))
+        return StreamExtent(float(first), float(last), rows, tuple(gaps), float(usual), tuple(warnings))
 
     def stretches(self) -> Iterator[ImuStream]:
-        """Give the rows piece by piece; raise InputError for values that are not numbers."""
+        """Give the rows piece by piece."""
+        for rows, _ in self._rows():
+            yield in_array_axes(rows, self.entry)
+
+    def _rows(self) -> Iterator[tuple[ImuRows, tuple[str, ...]]]:
+        """Give the rows that the chip measured, piece by piece, and warnings of those that it did not."""
         before: list[Array] | None = None
         done = 0
         for source, values in self._pieces(self.source.path, self._cells):
-            known = 0 if before is None else 1
+            known = 0 if before is None else len(before[0])
             whole = values if before is None else [np.concatenate([a, b]) for a, b in zip(before, values, strict=True)]
             rows = table.imu_rows(source, whole, self.columns, self.entry.rate_hz, done - known)
-            fresh = ImuRows(source, rows.time[known:], rows.dtheta[known:], rows.dvel[known:])
-            row = 0 if source.first_line else done
-            stream_checks.check_finite(source, {"gyro": fresh.dtheta, "accel": fresh.dvel}, row)
-            for text in without_faults(fresh, self.entry.name, self.entry.clock_offset_s)[1]:
-                raise InputError(
-                    text.replace("left out", "of a recording this long nothing is left out; expected none")
-                )
-            yield in_array_axes(fresh, self.entry)
-            before = [column[-1:] for column in values]
-            done += len(fresh.time)
+            row = (0 if source.first_line else done) - known
+            stream_checks.check_finite(source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel}, row)
+            stream_checks.check_order(source, rows.time, first_row=row)
+            good, texts = without_faults(rows, self.entry.name, self.entry.clock_offset_s)
+            fresh = _after(good, rows.time[known - 1] if known else -np.inf)
+            yield fresh, texts if len(fresh.time) < len(rows.time) - known else ()
+            done += len(rows.time) - known
+            before = [column[-CONTEXT:] for column in whole]
 
-    def _stamps(self) -> Iterator[tuple[Source, Array]]:
-        done, rate = 0, self.entry.rate_hz
-        unit = 1.0 if self.columns.time is None else table.SECONDS[self.columns.time.unit]
-        for source, values in self._pieces(self.source.path, self._cells[-1:]):
-            own = values[0] * unit if rate is None else np.arange(done, done + len(values[0])) / rate
-            yield source, own + self.entry.clock_offset_s
-            done += len(values[0])
+
+def _after(rows: ImuRows, time: float) -> ImuRows:
+    first = int(np.searchsorted(rows.time, time, "right"))
+    return replace(rows, time=rows.time[first:], dtheta=rows.dtheta[first:], dvel=rows.dvel[first:])
 
 
 def can_be_read_in_order(entry: ImuEntry) -> bool:

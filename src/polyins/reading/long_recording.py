@@ -24,15 +24,20 @@ from polyins.reading import loading
 from polyins.reading.imu_file import ImuFile, StreamExtent, StretchReader, can_be_read_in_order
 from polyins.reading.imu_stream import as_mounted
 
-STRETCH_S = 60.0
+STRETCH_S = 30.0
 HEAD_S = 300.0
-"""the beginning, from which units and axes are checked and the start is found"""
+HEAD_ROWS = 1_000_000
+"""of all IMUs together: so much of the beginning, or HEAD_S, tells units, axes and the start"""
+AROUND_START_S = 60.0
+"""of the beginning after a start that is given"""
+MOST_HEAD_ROWS = 20_000_000
+"""up to a start that is given"""
 MARGIN_S = 3.0
 """by which the stretches overlap while they are aligned"""
 LEAST_FIRST_S = 10.0
 """of the first stretch, whose epochs tell the rate"""
-LARGE = 20_000_000
-"""rows of all IMUs together: with so many a recording takes gigabytes when it is in memory"""
+LARGE = 3_000_000
+"""rows of all IMUs together: with so many a recording takes nearly a gigabyte when it is in memory"""
 BYTES_OF_ROW = 40
 """of a file, seldom less: tells without reading it that it cannot have many rows"""
 
@@ -118,7 +123,7 @@ class LongRecording:
 def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecording | None:
     """Open a recording that can be taken in stretches and has that many rows; None for any other.
 
-    It can unless a clock offset is estimated, a gyro's range leaves rows out, or the format repairs rows by others.
+    It can unless a clock offset is estimated, a gyro's range is given, or the format repairs rows by their neighbours.
     Raises InputError as `load` does.
     """
     config, document, warnings = settings
@@ -132,14 +137,31 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
         return None
     notes = wheel_checks.check_settings(config, document)
     span = _span(files, extents)
-    streams = tuple(StretchReader(file).until(span[0] + HEAD_S, span[0]) for file in files)
+    until = _head_end(config, document, extents, span)
+    streams = tuple(StretchReader(file).until(until, span[0]) for file in files)
     for number in range(len(files)):
-        notes += _checked(files[number], streams[number], number, document)
+        notes += (*_checked(files[number], streams[number], number, document), *extents[number].warnings)
     faults.check_alive(streams)
     imus = tuple(as_mounted(entry) for entry in config.imus)
     head = loading.assemble(config, document, imus, streams, span)
     warnings = (*warnings, *notes, *head.warnings)
     return LongRecording(replace(head, warnings=warnings, config_text=loading.in_force(config)), files, extents, span)
+
+
+def _head_end(config: Config, document: Document, extents: Sequence[StreamExtent], span: tuple[float, float]) -> float:
+    """Return up to which time the beginning of the IMUs is held, s."""
+    rate = sum(1.0 / extent.interval for extent in extents)
+    until = span[0] + max(HEAD_S, HEAD_ROWS / rate)
+    for key in ("time_s", "static_interval_s"):
+        value = getattr(config.start, key)
+        if value is None:
+            continue
+        until = max(until, float(np.max(value)) + AROUND_START_S)
+        if (until - span[0]) * rate > MOST_HEAD_ROWS and until < span[1]:
+            place = document.place(["start", key])
+            latest = span[0] + MOST_HEAD_ROWS / rate - AROUND_START_S
+            raise InputError(f"{place}: is late in a recording this long; expected at most {latest:.0f} s")
+    return until
 
 
 def _can_be_streamed(config: Config, document: Document) -> bool:

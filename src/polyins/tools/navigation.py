@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from polyins.errors import InputError
 from polyins.evaluation.errors import Errors
 from polyins.evaluation.figures import Figures
 from polyins.evaluation.summary import Document, document
@@ -22,13 +21,12 @@ from polyins.model.recording import Recording
 from polyins.model.solution import Solution
 from polyins.navigate import batch
 from polyins.navigate.choice import Choice, choose
-from polyins.prepare import alignment
 from polyins.prepare.alignment import Start
 from polyins.prepare.timesync import Aligned
-from polyins.reading.long_recording import HEAD_S, STRETCH_S, LongRecording
+from polyins.reading.long_recording import STRETCH_S, LongRecording
 from polyins.report.decimation import kept_for_display
 
-SHOWN_EPOCHS = 20_000
+SHOWN_EPOCHS = 8000
 """epochs of a long recording's solution that are kept for the report, at least"""
 SHOWN_LOGS = 2000
 """rows of its log of IMU errors, likewise"""
@@ -112,14 +110,9 @@ def _parts(
 
 def _extent(recording: LongRecording, row: Method) -> tuple[Start, float]:
     """Find the start in the beginning; returns the end of the run as well, s."""
-    known, aligned = recording.head, recording.beginning()
-    wanted, (first, last) = known.start.time, recording.span
-    if wanted is not None and wanted > aligned.time[-1] - alignment.LEAST_LEFT:
-        raise InputError(
-            f"start: time {wanted:.3f} s; of a recording this long expected in its first {HEAD_S:g} s,"
-            f" {first:.3f} to {aligned.time[-1]:.3f} s"
-        )
-    return batch.start_of(row, known, aligned), last if known.start.end_time is None else known.start.end_time
+    known = recording.head
+    start = batch.start_of(row, known, recording.beginning())
+    return start, recording.span[1] if known.start.end_time is None else known.start.end_time
 
 
 def _laid_out(row: Method, choice: Choice, recording: LongRecording, first: Aligned, start: Start) -> batch.Prepared:
