@@ -228,5 +228,9 @@ def _write(path: str | Path, names: Sequence[str], values: Sequence[Array]) -> N
     rows = np.column_stack(values)
     table = arrow_table({name: to_arrow(rows[:, n]) for n, name in enumerate(names)})
     content = BufferOutputStream()
-    (parquet.write_table if plain_suffix(path) == ".parquet" else csv.write_csv)(table, content)
+    if plain_suffix(path) == ".parquet":
+        # numbers that never repeat gain nothing from a dictionary, but from keeping their like bytes together
+        parquet.write_table(table, content, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+    else:
+        csv.write_csv(table, content)
     write_bytes(path, content.getvalue().to_pybytes())
