@@ -44,7 +44,7 @@ def stopped_at_once() -> Iterator[list[str]]:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_starts_and_stops(command: str, desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_run, "_stop_signals", stopped_at_once)
-    monkeypatch.setattr(live_run, "rehearse", lambda *arguments: None)
+    monkeypatch.setattr(live_run, "preload", lambda *arguments: None)
     # any free port, and a folder of this test
     words = shlex.split(
         re.sub(r":(?:5555|10110|14550)\b|(?<=--page )8080", lambda m: m[0][:1].strip("8") + "0", command)

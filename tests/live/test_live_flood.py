@@ -9,8 +9,8 @@ from pathlib import Path
 import flooding
 import pytest
 
+from polyins.live.conversion import Conversion
 from polyins.live.datagrams import Datagrams, lines_of
-from polyins.live.intake import Intake
 from polyins.live.session import Session
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
@@ -50,7 +50,7 @@ def navigated(config: Path, datagrams: list[tuple[str, bytes]], samples: int) ->
 
     settings, document, _ = loading.read_config(config)
     blank, _ = loading.without_data(settings, document)
-    intake = Intake(settings, blank.rig, blank.geodetic)
+    conversion = Conversion(settings, blank.rig, blank.geodetic)
     source, kept = Datagrams("udp://127.0.0.1:0", ("127.0.0.1", 0), lines_of), Kept()
     begin = partial(Navigator, blank.rig, method="enav-fusion", options=blank.options, delay=DELAY)
     session = Session(Starter(blank, DELAY, needs_fix=True), begin, [Outlet(kept, 50.0)])
@@ -59,10 +59,10 @@ def navigated(config: Path, datagrams: list[tuple[str, bytes]], samples: int) ->
         good += kind == "good"
         for sample in source.taken([datagram], good / samples * SECONDS):
             try:
-                session.take(intake.taken(sample))
+                session.take(conversion.taken(sample))
             except RefusedError as error:
                 source.counts[str(error)] += 1
-    for sample in source.front.release(SECONDS):
+    for sample in source.stamps.release(SECONDS):
         session.take(sample)
     session.finish()
     source.socket.close()

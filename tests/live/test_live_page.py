@@ -56,7 +56,7 @@ def test_the_page_follows_a_replay(
     browser: Any, drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pages: list[live_page.Page] = []
-    told: dict[str, dict[str, Any]] = {}
+    said: dict[str, dict[str, Any]] = {}
 
     class Watched(live_page.Page):
         """Keeps what it showed."""
@@ -67,7 +67,7 @@ def test_the_page_follows_a_replay(
 
         def take(self, snapshot: Snapshot) -> None:
             super().take(snapshot)
-            told[f"{snapshot.row['time_s']:.1f} s"] = json.loads(self.news)
+            said[f"{snapshot.row['time_s']:.1f} s"] = json.loads(self.news)
 
     monkeypatch.setattr(live_run, "Page", Watched)
     options = live_run.Options(drive, tmp_path, sinks=(), speed=10.0, page=0)
@@ -87,7 +87,7 @@ def test_the_page_follows_a_replay(
     assert wait_for(lambda: browser.execute_script(READ)["status"] == "stopped")
     assert first["clock"] != in_outage["clock"] != second["clock"]
     for shown in (first, in_outage, second):
-        news = told[shown["clock"]]
+        news = said[shown["clock"]]
         assert shown["status"] == news["status"]
         state, seen = news["state"], figures(shown)
         for name in ("roll", "pitch", "heading"):

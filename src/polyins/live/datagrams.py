@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 from polyins.live import lines
-from polyins.live.front import Front
 from polyins.live.receive import Receiver
 from polyins.live.source import POLL, RefusedError
+from polyins.live.stamp_check import StampCheck
 from polyins.navigate.samples import Sample
 
 LONGEST = 8192
@@ -39,7 +39,7 @@ class Datagrams:
         self.url = url
         self.counts: Counter[str] = Counter()
         self.parse = parse
-        self.front = Front(self.counts)
+        self.stamps = StampCheck(self.counts)
         self.stopped = False
         self.socket = socket.socket(socket.AF_INET6 if ":" in address[0] else socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(address)
@@ -53,7 +53,7 @@ class Datagrams:
                 if self.receiver.lost:
                     self.counts["lost before they were read"] = self.receiver.lost
                 yield self.taken(datagrams, time.monotonic())
-            yield self.front.release(time.monotonic())
+            yield self.stamps.release(time.monotonic())
 
     def stop(self) -> None:
         """Let `chunks` end."""
@@ -69,4 +69,4 @@ class Datagrams:
                 self.counts["malformed"] += 1
             else:
                 samples += self.parse(datagram, self.counts)
-        return self.front.admit(samples, now)
+        return self.stamps.admit(samples, now)

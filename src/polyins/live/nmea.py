@@ -9,7 +9,7 @@ from polyins.live.lines import checksum
 from polyins.live.snapshot import Snapshot
 
 UNIX_TIME = 1e9
-"""Stamps above this are seconds of Unix time; below, only their time of day is told."""
+"""Stamps above this are seconds of Unix time; below, only their time of day is known."""
 DAY = 86400.0
 KNOT = 1852.0 / 3600.0
 FIX, ESTIMATED = 1, 6

@@ -15,7 +15,7 @@ from polyins.live.snapshot import Snapshot
 
 RATE_HZ = 10.0
 TRACK = 4000
-"""points that a page which opens later is told of; every second one goes when there are more"""
+"""points that a page which opens later is sent; every second one goes when there are more"""
 KEEP_ALIVE = 5.0  # s
 POLICY = "default-src 'self'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 

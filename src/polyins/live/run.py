@@ -22,11 +22,11 @@ from polyins.errors import InputError
 from polyins.files import make_folder
 from polyins.formats.documents import write_document
 from polyins.kernels.compilation import compilation_said
+from polyins.live.conversion import Conversion
 from polyins.live.inbox import Inbox
-from polyins.live.intake import Intake
 from polyins.live.page import RATE_HZ as PAGE_RATE_HZ
 from polyins.live.page import Page
-from polyins.live.rehearsal import rehearse
+from polyins.live.preload import preload
 from polyins.live.replay import Replay
 from polyins.live.session import Checkpoints, Session
 from polyins.live.sinks import Outlet, ParquetLog, open_sink
@@ -47,6 +47,10 @@ if TYPE_CHECKING:
 
 REPLAY = "replay:"
 TOLD = 5.0  # s, at least, between two messages on what is missing for a start
+
+
+Opened = tuple[Source, Conversion | None]
+"""a source, and what its samples go through; those of a replay are as the navigator wants them"""
 
 
 @dataclass(frozen=True)
@@ -105,7 +109,9 @@ def run(options: Options) -> dict[str, Any]:
 class Live:
     """Threads that read, one that navigates."""
 
-    def __init__(self, session: Session, sources: Sequence[tuple[Source, Intake | None]], stopped: list[str]) -> None:
+    def __init__(
+        self, session: Session, sources: Sequence[tuple[Source, Conversion | None]], stopped: list[str]
+    ) -> None:
         self.session = session
         self.sources = sources
         self.signals = stopped
@@ -114,7 +120,7 @@ class Live:
         self.files: list[Path] = []
         self.inbox = Inbox(len(sources))
         self.failure: Exception | None = None
-        self.told = (time.monotonic(), "")
+        self.said = (time.monotonic(), "")
 
     def open_outlets(self, options: Options, method: str, config: Config) -> None:
         """Open sinks, log and page."""
@@ -160,16 +166,16 @@ class Live:
         why, now = self.session.starter.why, time.monotonic()
         if self.page is not None:
             self.page.tell()
-        if why != self.told[1] and now - self.told[0] > TOLD:
+        if why != self.said[1] and now - self.said[0] > TOLD:
             say(f"looking for a start: {why}")
-            self.told = now, why
+            self.said = now, why
 
-    def _pump(self, source: Source, intake: Intake | None) -> None:
+    def _pump(self, source: Source, conversion: Conversion | None) -> None:
         try:
             for samples in source.chunks():
-                self.inbox.put(_admitted(samples, source, intake))
+                self.inbox.put(_admitted(samples, source, conversion))
         except Exception as error:
-            self.failure = error  # told when what has come is safe
+            self.failure = error  # raised when what has come is safe
         finally:
             self.inbox.source_ended()
 
@@ -217,13 +223,13 @@ class Live:
         }
 
 
-def _admitted(samples: list[Sample], source: Source, intake: Intake | None) -> list[Sample]:
-    if intake is None:
+def _admitted(samples: list[Sample], source: Source, conversion: Conversion | None) -> list[Sample]:
+    if conversion is None:
         return samples
     admitted = []
     for sample in samples:
         try:
-            admitted.append(intake.taken(sample))
+            admitted.append(conversion.taken(sample))
         except RefusedError as error:
             source.counts[str(error)] += 1
     return admitted
@@ -253,7 +259,7 @@ def _session(options: Options, config: Config, recording: Recording, method: str
         wait=options.wait,
     )
     with compilation_said():
-        rehearse(recording, method, latest, begin)
+        preload(recording, method, latest, begin)
     starter = Starter(replace(recording, imus=(), gnss=None), latest, needs_fix, method)
     every = options.checkpoint_every or math.inf
     checkpoints = Checkpoints(options.out, every)
@@ -264,16 +270,14 @@ def _session(options: Options, config: Config, recording: Recording, method: str
     return session
 
 
-def _sources(
-    options: Options, config: Config, recording: Recording, session: Session
-) -> list[tuple[Source, Intake | None]]:
+def _sources(options: Options, config: Config, recording: Recording, session: Session) -> list[Opened]:
     names = tuple(imu.name for imu in recording.rig.imus)
-    intake = Intake(config, recording.rig, recording.geodetic)
+    conversion = Conversion(config, recording.rig, recording.geodetic)
     after = -math.inf
     if session.navigator is not None and session.navigator.state is not None:
         after = session.navigator.state.time - 2.0 * options.delay
     return [
-        (Replay(recording, options.speed, after), None) if url == REPLAY else (open_source(url, names), intake)
+        (Replay(recording, options.speed, after), None) if url == REPLAY else (open_source(url, names), conversion)
         for url in options.sources
     ]
 

@@ -113,7 +113,7 @@ class Session:
         else:
             assert sample.position_std is not None
             self.navigator.gnss(sample.time, sample.position, sample.position_std, sample.velocity, sample.velocity_std)
-        # when a state is told depends on what was taken, never on what was refused
+        # when a state is passed on depends on what was taken, never on what was refused
         if sum(self.navigator.counts.values()) == refused:
             self._taken(sample)
 

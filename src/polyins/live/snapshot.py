@@ -1,4 +1,4 @@
-"""The navigation state at one instant, and the figures by which it is told."""
+"""The navigation state at one instant, and the figures that show it."""
 
 from __future__ import annotations
 

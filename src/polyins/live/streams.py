@@ -14,8 +14,8 @@ from urllib.parse import SplitResult, parse_qs
 
 from polyins.errors import InputError
 from polyins.live import lines
-from polyins.live.front import Front
 from polyins.live.source import POLL, RefusedError
+from polyins.live.stamp_check import StampCheck
 from polyins.navigate.samples import Sample
 from polyins.screen import say
 
@@ -136,17 +136,17 @@ class LineStream:
         self.parse = parse
         self.longest = longest
         self.counts: Counter[str] = Counter()
-        self.front = Front(self.counts) if checked else None
+        self.stamps = StampCheck(self.counts) if checked else None
         self.stopped = False
         self.rest = b""
 
     def chunks(self) -> Iterator[list[Sample]]:
         """Yield what has come, as `Source` says."""
-        told = ""
+        said = ""
         while not self.stopped:
             try:
                 self.link.open()
-                told = ""
+                said = ""
                 yield from self._until_the_end()
                 reason = "the other side ended the connection"
             except OSError as error:
@@ -155,13 +155,13 @@ class LineStream:
                 self.link.close()
             if self.link.ends or self.stopped:
                 break
-            if reason != told:
+            if reason != said:
                 say(f"{self.url}: {reason}; trying again every {AGAIN:g} s")
-            told = reason
+            said = reason
             self.counts["connections lost"] += 1
             self._wait()
-        if self.front is not None:
-            yield self.front.release(time.monotonic())
+        if self.stamps is not None:
+            yield self.stamps.release(time.monotonic())
 
     def stop(self) -> None:
         """Let `chunks` end."""
@@ -188,7 +188,7 @@ class LineStream:
             # of a line without an end, only that it is too long matters
             self.rest = self.rest[: self.longest + 1]
         samples = [sample for line in whole if line.strip() and (sample := self._parsed(line)) is not None]
-        return samples if self.front is None else self.front.admit(samples, time.monotonic())
+        return samples if self.stamps is None else self.stamps.admit(samples, time.monotonic())
 
     def _parsed(self, line: bytes) -> Sample | None:
         try:

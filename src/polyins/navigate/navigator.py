@@ -1,4 +1,4 @@
-"""The live front of the engine: samples and measurements as they come, the state at any time.
+"""The engine on live data: samples and measurements as they come, the state at any time.
 
 A recording that is played through it gives the solution of a batch run, bit for bit.
 """

@@ -25,7 +25,7 @@ RATE_HZ = 50.0
 GRAVITY = 9.8  # m/s^2
 
 
-def rehearse(recording: Recording, method: str, delay: float, begin: Callable[[Start], Navigator]) -> None:
+def preload(recording: Recording, method: str, delay: float, begin: Callable[[Start], Navigator]) -> None:
     """Navigate at rest with the rig of a recording, and throw away what comes out."""
     still = _at_rest(recording)
     with TemporaryDirectory() as folder:

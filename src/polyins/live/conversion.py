@@ -12,7 +12,7 @@ from polyins.reading import sensor_stream
 from polyins.reading.position_stream import height_shift, on_plane
 
 
-class Intake:
+class Conversion:
     """What a configuration says of mounts, clocks, heights and accuracies, applied to one sample at a time."""
 
     def __init__(self, config: Config, rig: Rig, geodetic: bool) -> None:

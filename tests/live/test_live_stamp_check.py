@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 
-from polyins.live import front
+from polyins.live import stamp_check
 from polyins.navigate.samples import ImuSample, Sample
 
 
@@ -12,33 +12,33 @@ def sample(time: float) -> Sample:
     return ImuSample("imu1", time, np.zeros(3), np.zeros(3))
 
 
-def started(offset: float = 0.0) -> front.Front:
-    """A front whose stamps are ahead of arrival by an offset."""
-    one = front.Front(Counter())
-    for k in range(front.FIRST_EPOCHS):
+def started(offset: float = 0.0) -> stamp_check.StampCheck:
+    """A check whose stamps are ahead of arrival by an offset."""
+    one = stamp_check.StampCheck(Counter())
+    for k in range(stamp_check.FIRST_EPOCHS):
         one.admit([sample(k / 100 + offset)], k / 100)
     return one
 
 
 def test_nothing_is_lost_at_the_beginning():
-    one, admitted = front.Front(Counter()), []
-    for k in range(3 * front.FIRST_EPOCHS):
+    one, admitted = stamp_check.StampCheck(Counter()), []
+    for k in range(3 * stamp_check.FIRST_EPOCHS):
         admitted += one.admit([sample(k / 100 + 1e9)], k / 100)
-    assert [e.time for e in admitted] == [k / 100 + 1e9 for k in range(3 * front.FIRST_EPOCHS)]
+    assert [e.time for e in admitted] == [k / 100 + 1e9 for k in range(3 * stamp_check.FIRST_EPOCHS)]
     assert not one.counts
 
 
 def test_a_few_epochs_wait_a_second_at_most():
-    one = front.Front(Counter())
+    one = stamp_check.StampCheck(Counter())
     assert one.admit([sample(5.0)], 100.0) == []
     assert [e.time for e in one.admit([], 101.0)] == [5.0]
-    one = front.Front(Counter())
+    one = stamp_check.StampCheck(Counter())
     one.admit([sample(5.0)], 100.0)
     assert [e.time for e in one.release(100.1)] == [5.0]
 
 
 def test_the_future_is_refused_even_where_it_comes_first():
-    one = front.Front(Counter())
+    one = stamp_check.StampCheck(Counter())
     one.admit([sample(1e6)] * 20, 0.0)
     admitted = []
     for k in range(500):
@@ -62,7 +62,7 @@ def test_a_stall_on_the_way_moves_nothing():
 
 
 def test_a_recording_sent_ten_times_faster_passes():
-    one = front.Front(Counter())
+    one = stamp_check.StampCheck(Counter())
     admitted = [e for k in range(2000) for e in one.admit([sample(k / 100)], k / 1000)]
     assert len(admitted) == 2000
 

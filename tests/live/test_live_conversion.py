@@ -8,7 +8,7 @@ import pytest
 
 from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
-from polyins.live.intake import Intake
+from polyins.live.conversion import Conversion
 from polyins.live.source import RefusedError
 from polyins.navigate.samples import GnssFix, ImuSample
 from polyins.reading import loading
@@ -17,22 +17,22 @@ IMU = {"name": "a", "axes": ["x", "-y", "-z"], "mount_deg": [0.0, 0.0, 90.0], "c
 FIX = GnssFix(7.0, np.array([0.8, 0.2, 500.0]), np.ones(3), np.ones(3), np.ones(3))
 
 
-def intake(folder: Path, **sections: Any) -> Intake:
+def conversion(folder: Path, **sections: Any) -> Conversion:
     path = folder / "live.yaml"
     path.write_text(write_yaml({"imus": [IMU, {"name": "b"}], **sections}))
     config, document, _ = loading.read_config(path)
     recording, _ = loading.without_data(config, document)
-    return Intake(config, recording.rig, recording.geodetic)
+    return Conversion(config, recording.rig, recording.geodetic)
 
 
-def refusal(one: Intake, sample: ImuSample | GnssFix) -> str:
+def refusal(one: Conversion, sample: ImuSample | GnssFix) -> str:
     with pytest.raises(RefusedError) as refused:
         one.taken(sample)
     return str(refused.value)
 
 
 def test_increments_are_turned_and_clocks_put_right(tmp_path: Path) -> None:
-    one = intake(tmp_path)
+    one = conversion(tmp_path)
     turned = one.taken(ImuSample("a", 10.0, np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 9.8])))
     # x forward, y left, z up; then a quarter turn to the right
     np.testing.assert_allclose(turned.dtheta, [2.0, 1.0, -3.0], atol=1e-15)
@@ -44,34 +44,34 @@ def test_increments_are_turned_and_clocks_put_right(tmp_path: Path) -> None:
 
 
 def test_fixes_as_configured(tmp_path: Path) -> None:
-    taken = intake(tmp_path, gnss={"clock_offset_s": -18.0, "position_std_m": [1.0, 2.0, 3.0]}).taken(FIX)
+    taken = conversion(tmp_path, gnss={"clock_offset_s": -18.0, "position_std_m": [1.0, 2.0, 3.0]}).taken(FIX)
     assert taken.time == -11.0
     np.testing.assert_array_equal(taken.position, FIX.position)
     np.testing.assert_array_equal(taken.position_std, [1.0, 2.0, 3.0])
     np.testing.assert_array_equal(taken.velocity, FIX.velocity)
-    plain = intake(tmp_path, gnss={})
+    plain = conversion(tmp_path, gnss={})
     assert plain.taken(FIX._replace(velocity_std=None)).velocity is None
     assert refusal(plain, FIX._replace(position_std=None)) == "GNSS without std"
     assert refusal(plain, FIX._replace(above_sea=True)) == "height above the sea without geoid_height_m"
     assert refusal(plain, FIX._replace(geodetic=False)) == "position of another kind"
-    assert refusal(intake(tmp_path), FIX) == "GNSS without a gnss section"
+    assert refusal(conversion(tmp_path), FIX) == "GNSS without a gnss section"
 
 
 def test_heights_above_the_sea(tmp_path: Path) -> None:
-    one = intake(tmp_path, gnss={"geoid_height_m": 47.0})
+    one = conversion(tmp_path, gnss={"geoid_height_m": 47.0})
     assert one.taken(FIX._replace(above_sea=True)).position[2] == 547.0
     assert one.taken(FIX).position[2] == 500.0
-    both = intake(tmp_path, gnss={"geoid_height_m": 47.0, "height": "sea-level"})
+    both = conversion(tmp_path, gnss={"geoid_height_m": 47.0, "height": "sea-level"})
     assert both.taken(FIX).position[2] == 547.0
 
 
 def test_positions_on_a_plane(tmp_path: Path) -> None:
     origin = {"latitude_deg": float(np.degrees(0.8)), "longitude_deg": float(np.degrees(0.2)), "height_m": 480.0}
-    taken = intake(tmp_path, gnss={"plane_origin": origin}).taken(FIX)
+    taken = conversion(tmp_path, gnss={"plane_origin": origin}).taken(FIX)
     assert not taken.geodetic
     np.testing.assert_allclose(taken.position, [0.0, 0.0, 20.0], atol=1e-6)
     metres = FIX._replace(geodetic=False, position=np.array([3.0, 4.0, 5.0]))
-    one = intake(tmp_path, gnss={}, start={"position": {"north_m": 0.0, "east_m": 0.0}})
+    one = conversion(tmp_path, gnss={}, start={"position": {"north_m": 0.0, "east_m": 0.0}})
     np.testing.assert_array_equal(one.taken(metres).position, [3.0, 4.0, 5.0])
     assert refusal(one, FIX) == "position of another kind"
 
@@ -85,4 +85,4 @@ def test_positions_on_a_plane(tmp_path: Path) -> None:
 )
 def test_what_needs_a_recording(tmp_path: Path, sections: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        intake(tmp_path, **sections)
+        conversion(tmp_path, **sections)

@@ -10,14 +10,14 @@ from polyins.navigate.samples import Sample
 AHEAD = 0.4
 """s by which a stamp may be ahead of the newest before it and the time since then"""
 DECAY = 0.1
-"""s per s by which the front falls back: what one wrong stamp below AHEAD moved, good ones set right again"""
+"""s per s by which the newest falls back: what one wrong stamp below AHEAD moved, good ones set right again"""
 FIRST_EPOCHS = 100
 FIRST_SECONDS = 1.0
 """The first stamps are judged together, when so many are there or so much time has passed: one that is wrong could
 otherwise be the one that all others are judged by."""
 
 
-class Front:
+class StampCheck:
     """How far the stamps of one source have come."""
 
     def __init__(self, counts: Counter[str]) -> None:
@@ -26,7 +26,7 @@ class Front:
         self.since = 0.0
         """when the first of the held samples, or the newest that was admitted, arrived, s"""
         self.lead: float | None = None
-        """stamp less arrival where the front is, s"""
+        """stamp of the newest less its arrival, s"""
 
     def admit(self, samples: list[Sample], now: float) -> list[Sample]:
         """Return the samples that are not from the future; `now`: their arrival, s, on any steady clock."""
@@ -40,7 +40,7 @@ class Front:
         return [sample for sample in samples if self._possible(sample.time, now)]
 
     def release(self, now: float) -> list[Sample]:
-        """Return the samples that are still held; the front starts from the middle of them."""
+        """Return the samples that are still held; the newest is then the middle of them."""
         samples, self.held = self.held, []
         if samples:
             self.lead, self.since = median(sample.time for sample in samples) - now, now
