@@ -20,6 +20,7 @@ from polyins.tools.summary_table import print_summaries
 from polyins.version import __version__
 
 if TYPE_CHECKING:
+    from polyins.evaluation.documents import CompareDocument
     from polyins.model.recording import Recording
     from polyins.reading.loading import Settings
     from polyins.reading.long_recording import LongRecording
@@ -253,7 +254,7 @@ def _compare_several(
     say(f"files: {out}" + ("" if no_report else f", reports: {out / '*' / 'report.html'}"))
 
 
-def _print_comparison(name: str, document: dict[str, Any]) -> None:
+def _print_comparison(name: str, document: CompareDocument) -> None:
     from polyins.evaluation.summary import on_wheels
 
     methods = document["methods"]

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.evaluation.consistency import mean_nis
+from polyins.evaluation.documents import (
+    CompareDocument,
+    ConsistencyFigures,
+    DriftFigures,
+    ErrorFigures,
+    GnssCounts,
+    MeasurementCounts,
+    MethodDocument,
+    OutageFigures,
+    PooledDocument,
+    RunDocument,
+)
 from polyins.evaluation.drift import drift
 from polyins.evaluation.errors import rms
 from polyins.evaluation.figures import Figures
@@ -20,10 +32,6 @@ from polyins.model.solution import Innovations, Solution
 from polyins.version import __version__
 
 Array = NDArray[np.float64]
-Document = dict[str, Any]
-"""what `json.dumps` takes, with None instead of NaN"""
-
-DRIFT = ("distance_m", "rate_percent", "end_percent")
 GNSS_COUNTS = ("fixes", "rejected", "reopened", "velocities_rejected")
 
 NEGLIGIBLE_SHARE = 0.01
@@ -31,7 +39,7 @@ NEGLIGIBLE_S = 1.0
 """A reference may lack less than this of the epochs, and less than this of the time, without a warning."""
 
 
-def summarize(solution: Solution, reference: Reference | None, outages: Sequence[Interval] = ()) -> Document:
+def summarize(solution: Solution, reference: Reference | None, outages: Sequence[Interval] = ()) -> RunDocument:
     """Return the `run` document of one solution.
 
     Raises InputError if the reference cannot be compared with.
@@ -41,7 +49,7 @@ def summarize(solution: Solution, reference: Reference | None, outages: Sequence
     return document(solution, figures)
 
 
-def document(solution: Solution, figures: Figures) -> Document:
+def document(solution: Solution, figures: Figures) -> RunDocument:
     """Return the `run` document of figures; of the solution only what has no row per epoch is looked at."""
     epochs, errors = figures.epochs, figures.errors
     whole = {
@@ -70,10 +78,12 @@ def document(solution: Solution, figures: Figures) -> Document:
         "mounting": _mounting(solution),
         "warnings": [*solution.warnings, *_warnings(figures)],
     }
-    return {key: plain(value) for key, value in whole.items()}
+    return cast(RunDocument, plain(whole))
 
 
-def comparison(summaries: Mapping[str, Document], each: Sequence[Document], alone: str = "single") -> Document:
+def comparison(
+    summaries: Mapping[str, RunDocument], each: Sequence[RunDocument], alone: str = "single"
+) -> CompareDocument:
     """Return the `compare` document of the summaries of several methods and of each IMU alone, run by `alone`.
 
     A single IMU's figures are the root mean square (of maxima the maximum, of times the mean) over all IMUs. The ratio
@@ -92,16 +102,18 @@ def comparison(summaries: Mapping[str, Document], each: Sequence[Document], alon
     }
 
 
-def pooled(each: Sequence[Document]) -> Document:
+def pooled(each: Sequence[RunDocument]) -> RunDocument:
     """Return one `run` document for all IMUs' runs on their own, with the runs themselves under `each`."""
     first = each[0]
     return {
         **first,
-        **{key: _pool([summary[key] for summary in each], np.mean) for key in ("filter_s", "us_per_epoch")},
+        "filter_s": _pool([summary["filter_s"] for summary in each], np.mean),
+        "us_per_epoch": _pool([summary["us_per_epoch"] for summary in each], np.mean),
         "first_call_s": max(summary["first_call_s"] for summary in each),
         "reference": _pooled_errors(each),
         "outages": _pooled_outages([summary["outages"] for summary in each]),
-        **{key: _means([summary[key] for summary in each]) for key in ("drift", "consistency")},
+        "drift": cast(DriftFigures, _means([summary["drift"] for summary in each])),
+        "consistency": cast(ConsistencyFigures, _means([summary["consistency"] for summary in each])),
         "gnss": {
             **_gnss_counts(each),
             "rejected_times_s": sorted({time for summary in each for time in summary["gnss"]["rejected_times_s"]}),
@@ -111,7 +123,7 @@ def pooled(each: Sequence[Document]) -> Document:
     }
 
 
-def over_recordings(documents: Sequence[Document]) -> Document:
+def over_recordings(documents: Sequence[CompareDocument]) -> PooledDocument:
     """Return the figures of each method that all of some `compare` documents have, over all their recordings.
 
     Errors are root mean squares (of maxima the maximum) in which every recording counts the same, and of outages every
@@ -132,32 +144,34 @@ def over_recordings(documents: Sequence[Document]) -> Document:
     }
 
 
-def _over_recordings(each: Sequence[Document]) -> Document:
+def _over_recordings(each: Sequence[RunDocument]) -> MethodDocument:
     maxima = [value for summary in each for value in summary["outages"]["each_m"]]
+    drifts = _means([summary["drift"] for summary in each])
     return {
         "method": each[0]["method"],
-        **{key: sum(summary[key] for summary in each) for key in ("duration_s", "epochs")},
+        "duration_s": sum(summary["duration_s"] for summary in each),
+        "epochs": sum(summary["epochs"] for summary in each),
         "us_per_epoch": _pool([_cost(summary) for summary in each], np.mean),
         "reference": _pooled_errors(each),
         "outages": {"count": len(maxima), "horizontal_max_rms_m": _pool(maxima, rms)},
-        "drift": _means([{key: summary["drift"][key] for key in DRIFT} for summary in each]),
-        "consistency": _means([summary["consistency"] for summary in each]),
+        "drift": cast(DriftFigures, {key: known for key, known in drifts.items() if key != "step_m"}),
+        "consistency": cast(ConsistencyFigures, _means([summary["consistency"] for summary in each])),
         "gnss": _gnss_counts(each),
     }
 
 
-def _pooled_errors(each: Sequence[Document]) -> Document:
-    return {
-        key: _pool([summary["reference"][key] for summary in each], np.max if "_max_" in key else rms)
-        for key in each[0]["reference"]
-    }
+def _pooled_errors(each: Sequence[RunDocument]) -> ErrorFigures:
+    every: list[Mapping[str, Any]] = [summary["reference"] for summary in each]
+    found = {key: _pool([figures[key] for figures in every], np.max if "_max_" in key else rms) for key in every[0]}
+    return cast(ErrorFigures, found)
 
 
-def _gnss_counts(each: Sequence[Document]) -> Document:
-    return {key: sum(summary["gnss"][key] for summary in each) for key in GNSS_COUNTS}
+def _gnss_counts(each: Sequence[RunDocument]) -> GnssCounts:
+    every: list[Mapping[str, Any]] = [summary["gnss"] for summary in each]
+    return cast(GnssCounts, {key: sum(counts[key] for counts in every) for key in GNSS_COUNTS})
 
 
-def figure(summary: Document | None) -> float | None:
+def figure(summary: MethodDocument | None) -> float | None:
     """Return the figure that methods are compared by.
 
     The outage statistic, m; without outages with wheels the drift rate, %; or else the horizontal rms, m.
@@ -165,11 +179,9 @@ def figure(summary: Document | None) -> float | None:
     if summary is None:
         return None
     if on_wheels(summary) and not summary["outages"]["count"]:
-        rate: float | None = summary["drift"]["rate_percent"]
-        return rate
-    of_outages: float | None = summary["outages"]["horizontal_max_rms_m"]
-    of_all: float | None = summary["reference"]["horizontal_rms_m"]
-    return of_outages if summary["outages"]["count"] else of_all
+        return summary["drift"]["rate_percent"]
+    outages = summary["outages"]
+    return outages["horizontal_max_rms_m"] if outages["count"] else summary["reference"]["horizontal_rms_m"]
 
 
 def on_wheels(summary: Mapping[str, Any]) -> bool:
@@ -178,7 +190,7 @@ def on_wheels(summary: Mapping[str, Any]) -> bool:
     return row is not None and row.for_wheels
 
 
-def _gnss(innovations: Innovations) -> Document:
+def _gnss(innovations: Innovations) -> dict[str, object]:
     rejected = ~innovations.accepted
     return {
         "fixes": innovations.time.size,
@@ -189,7 +201,7 @@ def _gnss(innovations: Innovations) -> Document:
     }
 
 
-def _measured(innovations: Innovations) -> Document:
+def _measured(innovations: Innovations) -> MeasurementCounts:
     """Count what became of the measurements of one kind; the NIS of the accepted, per degree of freedom."""
     accepted = innovations.accepted
     degrees = int(innovations.rows[accepted].sum())
@@ -201,7 +213,7 @@ def _measured(innovations: Innovations) -> Document:
     }
 
 
-def _mounting(solution: Solution) -> Document:
+def _mounting(solution: Solution) -> dict[str, object]:
     """Return the last estimate of what is estimated of the mounting of each IMU, and its std."""
     if solution.mounting is None or solution.mounting_std is None or not solution.imu_error_time.size:
         return {}
@@ -232,7 +244,7 @@ def _warnings(figures: Figures) -> list[str]:
     return found
 
 
-def _pooled_outages(statistics: Sequence[Document]) -> Document:
+def _pooled_outages(statistics: Sequence[OutageFigures]) -> OutageFigures:
     maxima = [statistic["each_m"] for statistic in statistics]
     return {
         **statistics[0],
@@ -241,7 +253,7 @@ def _pooled_outages(statistics: Sequence[Document]) -> Document:
     }
 
 
-def _means(parts: Sequence[Document]) -> Document:
+def _means(parts: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
     return {key: _pool([part[key] for part in parts], np.mean) for key in parts[0]}
 
 
@@ -250,7 +262,7 @@ def _pool(values: Sequence[float | None], combine: Callable[[Array], Any]) -> fl
     return float(combine(known)) if known.size else None
 
 
-def _cost(summary: Document | None) -> float | None:
+def _cost(summary: MethodDocument | None) -> float | None:
     return None if summary is None else summary["us_per_epoch"]
 
 

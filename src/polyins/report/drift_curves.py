@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from polyins.evaluation.drift import drift_curve, drift_rates
+from polyins.evaluation.drift import STEP, drift_curve, drift_rates
 from polyins.report.decimation import kept_for_display, points_per_trace
 from polyins.report.figure import Figure, Trace, scatter
 from polyins.report.scene import Run, Scene
@@ -35,7 +35,7 @@ def _traces(run: Run, points: int) -> Iterator[Trace]:
     distance, rate = run.errors.distance, drift_curve(run.errors)
     known = np.flatnonzero((distance > DRAWN_FROM * distance[-1]) & np.isfinite(rate))
     drawn = known[kept_for_display(rate[known, None], points)]
-    multiples, rates = drift_rates(run.errors, run.summary["drift"]["step_m"])
+    multiples, rates = drift_rates(run.errors, run.summary["drift"].get("step_m") or STEP)
     yield scatter(
         x=distance[drawn].astype(np.float32),
         y=rate[drawn].astype(np.float32),

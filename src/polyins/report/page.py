@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from polyins.evaluation.summary import Document
+from polyins.evaluation.documents import CompareDocument
 from polyins.files import whole
 from polyins.report.drift_curves import drift_figure
 from polyins.report.error_curves import attitude_figure, position_figure, velocity_figure
@@ -52,7 +52,7 @@ NO_BUTTONS = ("sendChartToCloud", "select2d", "lasso2d")
 SETTINGS = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": NO_BUTTONS}
 
 
-def write_report(path: Path, scene: Scene, comparison: Document | None = None) -> None:
+def write_report(path: Path, scene: Scene, comparison: CompareDocument | None = None) -> None:
     """Write the report of a scene to `path`; with the `compare` document the table shows its figures and ratios."""
     recording = scene.recording
     text = _template().render(

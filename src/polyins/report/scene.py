@@ -9,9 +9,10 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.evaluation.documents import CompareDocument, RunDocument
 from polyins.evaluation.errors import Errors, compare_to_reference
 from polyins.evaluation.outages import Interval
-from polyins.evaluation.summary import Document, on_wheels
+from polyins.evaluation.summary import on_wheels
 from polyins.model.attitude import rotation_matrices
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import Recording, usual_interval
@@ -42,7 +43,7 @@ class Run:
 
     name: str
     solution: Solution
-    summary: Document
+    summary: RunDocument
     errors: Errors | None
     colour: str
     dash: str
@@ -77,9 +78,9 @@ class Scene:
     @classmethod
     def of(
         cls,
-        runs: Mapping[str, tuple[Solution, Document]],
+        runs: Mapping[str, tuple[Solution, RunDocument]],
         recording: Recording,
-        comparison: Document | None = None,
+        comparison: CompareDocument | None = None,
         errors: Mapping[str, Errors | None] | None = None,
         gaps: Mapping[str, Sequence[Interval]] | None = None,
     ) -> Scene:

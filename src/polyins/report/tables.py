@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from polyins.evaluation.summary import Document, on_wheels
+from polyins.evaluation.documents import CompareDocument, OutageFigures, RunDocument
+from polyins.evaluation.summary import on_wheels
 from polyins.formats.documents import plain
 from polyins.model.recording import Recording
 from polyins.report.scene import Run, Scene
@@ -25,7 +26,7 @@ class Table:
 
 UNKNOWN = "\N{EM DASH}"
 
-COLUMNS: tuple[tuple[str, int, Callable[[Document], float | None]], ...] = (
+COLUMNS: tuple[tuple[str, int, Callable[[RunDocument], float | None]], ...] = (
     ("outages: rms of max. (m)", 2, lambda run: run["outages"]["horizontal_max_rms_m"]),
     ("drift rate (%)", 2, lambda run: run["drift"]["rate_percent"] if on_wheels(run) else None),
     ("end point (%)", 2, lambda run: run["drift"]["end_percent"] if on_wheels(run) else None),
@@ -40,10 +41,13 @@ COLUMNS: tuple[tuple[str, int, Callable[[Document], float | None]], ...] = (
     ("fixes rejected", 0, lambda run: run["gnss"]["rejected"] if run["gnss"]["fixes"] else None),
     ("time per epoch (µs)", 2, lambda run: run["us_per_epoch"]),
 )
-RATIOS = (("error, {0} / method", "ratio_to_single"), ("time, method / {0}", "time_ratio_to_single"))
+RATIOS: tuple[tuple[str, Callable[[CompareDocument], dict[str, float | None]]], ...] = (
+    ("error, {0} / method", lambda document: document["ratio_to_single"]),
+    ("time, method / {0}", lambda document: document["time_ratio_to_single"]),
+)
 
 
-def figures_table(scene: Scene, comparison: Document | None) -> Table:
+def figures_table(scene: Scene, comparison: CompareDocument | None) -> Table:
     """Return the table of figures, one row for each run."""
     rows = [_figures(run, comparison) for run in scene.runs]
     known = [column for column, cells in enumerate(zip(*rows, strict=True)) if {text for _, text in cells} != {UNKNOWN}]
@@ -81,12 +85,12 @@ def warnings_by_text(scene: Scene) -> list[tuple[str, str]]:
     return list({**named, **dict.fromkeys(scene.recording.warnings, "")}.items())
 
 
-def _figures(run: Run, comparison: Document | None) -> list[Cell]:
+def _figures(run: Run, comparison: CompareDocument | None) -> list[Cell]:
     own = [(heading, _number(pick(run.summary), digits)) for heading, digits, pick in COLUMNS]
     if comparison is None:
         return own
     alone = "wheel-ins" if run.on_wheels else "single"
-    return own + [(heading.format(alone), _number(comparison[key].get(run.name), 2)) for heading, key in RATIOS]
+    return own + [(heading.format(alone), _number(pick(comparison).get(run.name), 2)) for heading, pick in RATIOS]
 
 
 def _number(value: float | None, digits: int) -> str:
@@ -99,7 +103,7 @@ def _imus(recording: Recording) -> str:
     return f"{len(names)} ({', '.join(shown)})"
 
 
-def _outages(outages: Document) -> str:
+def _outages(outages: OutageFigures) -> str:
     if not outages["count"]:
         return "none"
     length = "" if outages["length_s"] is None else f" of {outages['length_s']:g} s"

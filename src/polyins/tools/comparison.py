@@ -9,7 +9,8 @@ from functools import partial
 from pathlib import Path
 
 from polyins.errors import InputError
-from polyins.evaluation.summary import Document, comparison, over_recordings
+from polyins.evaluation.documents import CompareDocument, SeveralDocument
+from polyins.evaluation.summary import comparison, over_recordings
 from polyins.model.methods import ARRAY_METHODS, find_method
 from polyins.model.recording import Recording
 from polyins.model.rig import Rig
@@ -34,7 +35,7 @@ class Comparison:
     """by method; the first IMU's for `single`"""
     each: dict[str, Solution]
     """every IMU on its own, by its name"""
-    document: Document
+    document: CompareDocument
     """the `compare` document"""
 
     @property
@@ -113,7 +114,7 @@ def compare_several(
     files: Files | None = None,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Document:
+) -> SeveralDocument:
     """Compare the methods over several recordings, by name what reads each; return the document of all.
 
     All runs share the threads. A recording is read when its turn comes and let go once `take` has taken what came out,
@@ -121,7 +122,7 @@ def compare_several(
     has a folder of its name there.
     """
 
-    def one(name: str, tell: Progress) -> Document:
+    def one(name: str, tell: Progress) -> CompareDocument:
         recording = recordings[name]()
         own = None if files is None else replace(files, folder=files.folder / name)
         result = compare(recording, methods, files=own, pool=pool, progress=tell)

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from polyins.evaluation.documents import RunDocument
 from polyins.evaluation.errors import Errors
 from polyins.evaluation.figures import Figures
-from polyins.evaluation.summary import Document, document
+from polyins.evaluation.summary import document
 from polyins.formats.solution_files import SolutionWriter
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
@@ -40,7 +41,7 @@ class Outcome:
     """of a long recording the epochs that a picture needs"""
     errors: Errors | None
     """of those epochs"""
-    summary: Document
+    summary: RunDocument
     """the `run` document"""
 
 

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from polyins.evaluation.documents import CompareDocument
 from polyins.files import write_bytes
 from polyins.formats.documents import write_document
 from polyins.model.recording import Recording
 from polyins.reading.long_recording import LongRecording
 from polyins.tools.comparison import Comparison
 from polyins.tools.navigation import Outcome, head
-
-Document = Mapping[str, Any]
 
 
 def write_run(folder: Path, recording: Recording | LongRecording, outcome: Outcome, report: bool = True) -> None:
@@ -41,7 +40,7 @@ def write_comparison(
         _write_report(folder, recording, runs, result.document)
 
 
-def _write_summary(folder: Path, recording: Recording, summary: Document) -> None:
+def _write_summary(folder: Path, recording: Recording, summary: Mapping[str, Any]) -> None:
     """Write summary and configuration, and take away the report of an earlier run."""
     write_document(folder / "summary.json", summary)
     write_bytes(folder / "config.yaml", recording.config_text.encode())
@@ -52,7 +51,7 @@ def _write_report(
     folder: Path,
     recording: Recording | LongRecording,
     runs: Mapping[str, Outcome],
-    comparison: dict[str, Any] | None = None,
+    comparison: CompareDocument | None = None,
 ) -> None:
     from polyins.report.page import write_report
     from polyins.report.scene import Scene, gaps_of
