@@ -14,7 +14,7 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, opened, read_bytes, read_head
 from polyins.formats.arrow_arrays import to_numpy
-from polyins.formats.rows import SourceFile
+from polyins.formats.rows import RowSource
 from polyins.model.recording import USUAL_OF, Array
 
 Column = str | int
@@ -31,7 +31,7 @@ BUFFER_BYTES = 1 << 16
 
 
 @dataclass(frozen=True)
-class TextLayout:
+class Dialect:
     """How a text table is built."""
 
     delimiter: str
@@ -55,24 +55,24 @@ def column_names(path: str | Path) -> tuple[str, ...]:
 
 def read_columns(
     path: str | Path, wanted: Sequence[Column], *, header_has: str = "", text_is_nan: bool = False
-) -> tuple[SourceFile, list[Array]]:
+) -> tuple[RowSource, list[Array]]:
     """Read the wanted columns, each of shape (T,); what is missing in a cell is NaN.
 
     `header_has`: a name by which the header line is known where other lines come before it. `text_is_nan`: cells that
     are not numbers are NaN instead of an error. Raises InputError that names the missing column or the bad line.
     """
     if find(path).suffix != ".gz" and read_head(path, 4) == PARQUET_MAGIC:
-        return SourceFile(str(find(path))), _parquet_columns(path, wanted)
+        return RowSource(str(find(path))), _parquet_columns(path, wanted)
     content = read_bytes(path)
     if content[:4] == PARQUET_MAGIC:
-        return SourceFile(str(find(path))), _parquet_columns(path, wanted, content)
+        return RowSource(str(find(path))), _parquet_columns(path, wanted, content)
     table = layout(path, content, header_has)
     places = [_place(find(path), table.names, column) for column in wanted]
     values = _text_columns(find(path), _tidy(content, table), table, places, text_is_nan, table.first_line - 1)
-    return SourceFile(str(find(path)), table.first_line), values
+    return RowSource(str(find(path)), table.first_line), values
 
 
-def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[SourceFile, list[Array]]]:
+def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[RowSource, list[Array]]]:
     """Read the wanted columns piece by piece, as `read_columns` reads them at once; a packed Parquet file cannot be.
 
     The first piece has more rows than `usual_interval` looks at.
@@ -88,7 +88,7 @@ def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[
             lines = content.split(b"\n", table.first_line - 1)
             content, line = lines[-1], table.first_line
         piece = replace(table, first_line=line)
-        yield SourceFile(str(found), line), _text_columns(found, _tidy(content, piece), piece, places, False, skipped=0)
+        yield RowSource(str(found), line), _text_columns(found, _tidy(content, piece), piece, places, False, skipped=0)
         line += content.count(b"\n")
 
 
@@ -106,7 +106,7 @@ def _whole_lines(path: Path) -> Iterator[bytes]:
             yield rest
 
 
-def _tidy(content: bytes, table: TextLayout) -> bytes:
+def _tidy(content: bytes, table: Dialect) -> bytes:
     """Return the content as the parser takes it: one blank between columns, and UTF-8."""
     if not content.isascii():
         content = content.decode(errors="replace").encode()
@@ -116,7 +116,7 @@ def _tidy(content: bytes, table: TextLayout) -> bytes:
     return content
 
 
-def layout(path: str | Path, content: bytes, header_has: str = "") -> TextLayout:
+def layout(path: str | Path, content: bytes, header_has: str = "") -> Dialect:
     """Find delimiter, header and first row of a text table."""
     lines = content[:HEAD_BYTES].decode("utf-8-sig", errors="replace").splitlines()
     start = next((n for n, line in enumerate(lines) if header_has in line and not _is_preamble(line)), None)
@@ -128,11 +128,11 @@ def layout(path: str | Path, content: bytes, header_has: str = "") -> TextLayout
     if any(_is_number(text) for text in fields):
         commented = _split(lines[start - 1].lstrip("#% "), delimiter) if start else []
         names = commented if len(commented) == len(fields) else [""] * len(fields)
-        return TextLayout(delimiter, tuple(names), start + 1)
+        return Dialect(delimiter, tuple(names), start + 1)
     if start + 1 >= len(lines):
         raise InputError(f"{find(path)}: has a header and no rows; expected data")
     extra = len(_split(lines[start + 1], delimiter)) - len(fields)
-    return TextLayout(delimiter, tuple(fields + [""] * max(extra, 0)), start + 2)
+    return Dialect(delimiter, tuple(fields + [""] * max(extra, 0)), start + 2)
 
 
 def _is_preamble(line: str) -> bool:
@@ -166,7 +166,7 @@ def _place(path: Path, names: Sequence[str], column: Column) -> int:
 
 
 def _text_columns(
-    path: Path, content: bytes, table: TextLayout, places: list[int], text_is_nan: bool, skipped: int
+    path: Path, content: bytes, table: Dialect, places: list[int], text_is_nan: bool, skipped: int
 ) -> list[Array]:
     """Return columns of a text; `skipped`: its lines before the first row."""
     from pyarrow import ArrowInvalid, float64
@@ -181,7 +181,7 @@ def _text_columns(
     return [to_numpy(column) for column in columns]
 
 
-def _parse(path: Path, content: bytes, table: TextLayout, places: list[int], kind: Any, skipped: int) -> list[Any]:
+def _parse(path: Path, content: bytes, table: Dialect, places: list[int], kind: Any, skipped: int) -> list[Any]:
     """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them."""
     from pyarrow import ArrowInvalid, BufferReader, csv
 
@@ -211,7 +211,7 @@ def _parse(path: Path, content: bytes, table: TextLayout, places: list[int], kin
     return [parsed[name] for name in wanted]
 
 
-def _numbers(path: Path, table: TextLayout, place: int, cells: Any, text_is_nan: bool) -> Array:
+def _numbers(path: Path, table: Dialect, place: int, cells: Any, text_is_nan: bool) -> Array:
     """Convert cell by cell, to find the one that is not a number."""
     values = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells.to_pylist()):
@@ -239,7 +239,7 @@ def _parquet_names(path: str | Path, content: bytes | None = None) -> tuple[str,
         raise InputError(f"{find(path)}: is not a whole Parquet file ({str(error).splitlines()[0]})") from error
 
 
-def _parquet_pieces(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[SourceFile, list[Array]]]:
+def _parquet_pieces(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[RowSource, list[Array]]]:
     from pyarrow import ArrowException, chunked_array, float64, parquet
 
     found, names = find(path), parquet_places(path, wanted)
@@ -247,7 +247,7 @@ def _parquet_pieces(path: str | Path, wanted: Sequence[Column]) -> Iterator[tupl
         file = parquet.ParquetFile(found, buffer_size=BUFFER_BYTES, pre_buffer=False)
         for batch in file.iter_batches(PIECE_ROWS, columns=names, use_threads=False):
             columns = (chunked_array([batch.column(name).cast(float64(), safe=False)]) for name in names)
-            yield SourceFile(str(found)), [to_numpy(column) for column in columns]
+            yield RowSource(str(found)), [to_numpy(column) for column in columns]
     except (ArrowException, OSError) as error:
         raise InputError(f"{found}: cannot be read ({str(error).splitlines()[0]})") from error
 

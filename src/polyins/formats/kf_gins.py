@@ -16,7 +16,7 @@ from polyins.files import find, opened, read_bytes, read_head, write_bytes
 from polyins.formats.arrow_arrays import to_numpy
 from polyins.formats.columns import HEAD_BYTES, PIECE_ROWS, Column
 from polyins.formats.columns import read_in_order as read_text_in_order
-from polyins.formats.rows import ImuRows, SourceFile, Track, intervals
+from polyins.formats.rows import ImuRows, RowSource, Track, intervals
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG
 
@@ -37,7 +37,7 @@ def read_imu(path: str | Path) -> ImuRows:
     content = read_bytes(path)
     text = is_text(content)
     rows = _numbers(path, content, {IMU_COLUMNS: "s, 3 rad, 3 m/s"}) if text else _binary(path, content)
-    return ImuRows(SourceFile(str(find(path)), 1 if text else None), rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+    return ImuRows(RowSource(str(find(path)), 1 if text else None), rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
 
 def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
@@ -52,7 +52,7 @@ def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
     rows = _binary(path, content)
     time = np.arange(len(rows)) / rate_hz if rate_hz else rows[:, 0]
     increments = rows[:, 1:] * intervals(time)[:, None]
-    source = SourceFile(str(find(path)))
+    source = RowSource(str(find(path)))
     return ImuRows(source, time, increments[:, :3], increments[:, 3:], gyro_unit="rad/s", accel_unit="m/s^2")
 
 
@@ -68,7 +68,7 @@ def columns_of(path: str | Path, *, rates: bool = False) -> ImuColumns:
     return ImuColumns.model_validate({"time": {"name": 1}, **units})
 
 
-def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[SourceFile, list[Array]]]:
+def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[RowSource, list[Array]]]:
     """Read columns of an IMU file, which have numbers, piece by piece; raises InputError as `read_imu` does."""
     if is_text(read_head(path, HEAD_BYTES)):
         yield from read_text_in_order(path, wanted)
@@ -76,7 +76,7 @@ def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[
     with opened(path) as file:
         while content := file.read(ROW_BYTES * PIECE_ROWS):
             rows = _binary(path, content)
-            yield SourceFile(str(find(path))), [rows[:, int(number) - 1].copy() for number in wanted]
+            yield RowSource(str(find(path))), [rows[:, int(number) - 1].copy() for number in wanted]
 
 
 def read_gnss(path: str | Path) -> Track:
@@ -89,7 +89,7 @@ def read_gnss(path: str | Path) -> Track:
         13: "the same with velocity and its std",
     }
     rows = _numbers(path, read_bytes(path), wanted)
-    source = SourceFile(str(find(path)), 1)
+    source = RowSource(str(find(path)), 1)
     if rows.shape[1] == 7:
         return Track(source, rows[:, 0], _radians(rows[:, 1:4], 2), position_std=rows[:, 4:7])
     return Track(
@@ -106,7 +106,7 @@ def read_nav(path: str | Path) -> Track:
     """Read a navigation result or truth: week, s, latitude, longitude (deg), height (m), velocity NED, angles (deg)."""
     rows = _numbers(path, read_bytes(path), {11: "week, s, lat, lon, h, vN, vE, vD, roll, pitch, heading"})
     return Track(
-        SourceFile(str(find(path)), 1),
+        RowSource(str(find(path)), 1),
         rows[:, 1],
         _radians(rows[:, 2:5], 2),
         velocity=rows[:, 5:8],

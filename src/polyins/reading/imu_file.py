@@ -16,7 +16,7 @@ from polyins.files import find
 from polyins.formats import columns, kf_gins, table
 from polyins.formats.columns import Column
 from polyins.formats.recognize import imu_format
-from polyins.formats.rows import ImuRows, SourceFile
+from polyins.formats.rows import ImuRows, RowSource
 from polyins.model.recording import Array, ImuStream, usual_interval
 from polyins.prepare.timesync import gaps_of
 from polyins.reading.imu_stream import in_array_axes
@@ -24,7 +24,7 @@ from polyins.reading.imu_stream import in_array_axes
 CONTEXT = 64
 """rows before each piece that say what repeats and where an interval begins"""
 
-Pieces = Callable[[str, Sequence[Column]], Iterator[tuple[SourceFile, list[Array]]]]
+Pieces = Callable[[str, Sequence[Column]], Iterator[tuple[RowSource, list[Array]]]]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class ImuFile:
 
     def __init__(self, entry: ImuEntry) -> None:
         self.entry = entry
-        self.source = SourceFile(str(find(entry.file)))
+        self.source = RowSource(str(find(entry.file)))
         self.columns, self._pieces = _format(entry)
         self._cells = table.imu_cells(self.columns, entry.rate_hz)
 
