@@ -435,7 +435,7 @@ CONFIGURATION: dict[str, type[BaseModel]] = {
     "columns.attitude": columns.AttitudeColumns,
     "columns.heading": columns.HeadingColumn,
     "columns.rows": columns.RowChoice,
-    "start": config.Start,
+    "start": config.StartEntry,
     "start.position": config.StartPosition,
     "outages": config.OutageSchedule,
     "filter": config.Filter,

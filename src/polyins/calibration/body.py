@@ -15,14 +15,13 @@ from polyins.calibration.motion import Motion, Running
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
 from polyins.model.recording import Array
-from polyins.model.rig import DEG
+from polyins.model.rig import DEG, STANDARD_GRAVITY
 
 WINDOW = 2.0  # s
 STEP = 0.25  # s
 SPEED_WINDOW = 0.2  # s
 LEAST_SPEED = 1.5  # m/s
 LEAST_TIME = 10.0  # s
-GRAVITY = 9.80665  # m/s^2
 CROSSFALL_STD = 1.0 * DEG
 """Roads fall to the side, and nothing in a drive tells that from a roll of the mount."""
 SLOPE_STD = 2.0 * DEG
@@ -58,7 +57,7 @@ def mount(body: Motion, rolled: Running, height: Running | None, name: str) -> M
     slope = np.zeros(len(middle)) if height is None else height.between(begin, end)[:, 0] / way
     forward = np.array([1.0, 0.0, 0.0])
     for _ in range(2):  # gravity along the slope is felt along the forward axis, which is known better the second time
-        level = force - GRAVITY * slope[:, None] * forward
+        level = force - STANDARD_GRAVITY * slope[:, None] * forward
         fits = [fit(design, level[:, k], piece, weights) for k in range(3)]
         angles, std = _angles(fits)
         forward = np.array([np.cos(angles[2]), -np.sin(angles[2]), 0.0])
@@ -95,4 +94,4 @@ def _angles(fits: list[Fit]) -> tuple[Array, Array]:
     # that the two disagree by more than their std counts too
     scatter = abs(yaws[0] - yaws[1]) * np.sqrt(trust.prod()) / trust.sum()
     yaw_spread = np.hypot(trust.sum() ** -0.5, scatter)
-    return np.array([roll, pitch, yaw]), np.array([std[1, 2] / GRAVITY, std[0, 2] / GRAVITY, yaw_spread])
+    return np.array([roll, pitch, yaw]), np.array([*std[[1, 0], 2] / STANDARD_GRAVITY, yaw_spread])

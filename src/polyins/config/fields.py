@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 from pydantic_core import PydanticCustomError
@@ -91,6 +92,9 @@ def blame(key: str, problem: str) -> PydanticCustomError:
 
 class Section(BaseModel):
     """A mapping in the file."""
+
+    FIELDS: ClassVar[Mapping[str, str]] = {}
+    """what the model calls the values of keys, without their units, where it calls them otherwise"""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 

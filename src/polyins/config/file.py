@@ -13,11 +13,11 @@ from polyins.config.imu import ImuEntry, ImuSettings
 from polyins.config.positions import GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling
 from polyins.config.sensors import HeadingEntry, HeightEntry, OdometerEntry
-from polyins.config.timing import Outages, Start
+from polyins.config.timing import Outages, StartEntry
+from polyins.config.units import UNITS, in_unit
 from polyins.config.yaml_document import Document, Key
 from polyins.errors import InputError
 from polyins.model.recording import FilterOptions, StandstillOptions
-from polyins.model.rig import DEG
 
 REST = StandstillOptions()
 
@@ -31,12 +31,8 @@ class Standstill(Section):
     """whether it rests is judged over this time, s; the longer, the rarer a false standstill"""
     velocity_std_m_s: Positive = REST.velocity_std
     """m/s; the larger, the less a standstill weighs"""
-    rate_std_deg_s: Positive = REST.rate_std / DEG
+    rate_std_deg_s: Positive = in_unit(UNITS["deg_s"], REST.rate_std)
     """of the mean rate, deg/s; above what an idling engine shakes"""
-
-    def options(self) -> StandstillOptions:
-        """Return the same as the filter takes it."""
-        return StandstillOptions(self.interval_s, self.velocity_std_m_s, self.rate_std_deg_s * DEG)
 
 
 class Filter(Section):
@@ -77,7 +73,7 @@ class Config(Section):
     """speeds of an encoder; that the vehicle does not slip"""
     reference: ReferenceEntry | None = None
     """what the solution is judged by"""
-    start: Start = Start()
+    start: StartEntry = StartEntry()
     """how the navigation state is found at the start"""
     outages: Outages = ()
     """intervals in which GNSS is withheld: a schedule, or a list of [from, to] in s"""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -53,6 +54,9 @@ def _axis_names(value: object) -> object:
 class Noise(Section):
     """How good an IMU is: random walks, and the std and correlation time of its slow errors (Gauss-Markov)."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {
+        name: f"{name}_std" for name in ("gyro_bias", "accel_bias", "gyro_scale", "accel_scale")
+    }
     grade: Literal["consumer-mems", "industrial-mems", "tactical"] | None = None
     """fills in what is not given below; without it consumer-mems does"""
     angle_random_walk_deg_sqrt_h: Spread

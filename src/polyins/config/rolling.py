@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-import numpy as np
 from pydantic import model_validator
 
 from polyins.config.fields import ORIGIN, NotNegative, Pair, Positive, PositiveSpread, Section, Triple, blame
@@ -70,16 +69,3 @@ class Rolling(Section):
         if window <= interval:
             return self
         raise blame("speed_window_s", f"is {window:g}; expected at most speed_interval_s, {interval:g}")
-
-    def options(self) -> RollingOptions:
-        """Return the same as the filter takes it."""
-        return RollingOptions(
-            speed_interval=self.speed_interval_s,
-            speed_window=self.speed_window_s,
-            predict=self.predict,
-            wheel_speed_std=np.array(self.wheel_speed_std_m_s),
-            body_speed_std=np.array(self.body_speed_std_m_s),
-            constraint_interval=self.constraint_interval_s,
-            constraint_std=self.constraint_std_m,
-            standstill=self.standstill,
-        )

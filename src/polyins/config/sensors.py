@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
 from polyins.config.columns import TimeColumn
 from polyins.config.fields import ORIGIN, Column, NotNegative, Number, Positive, Section, Triple
@@ -37,6 +38,8 @@ class SensorEntry(Section):
 class HeightEntry(SensorEntry):
     """Heights of a barometer, or known ones, above what the heights of GNSS are above."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {"bias_std": "offset_std", "bias_random_walk": "offset_random_walk"}
+
     std_m: Positive | None = None
     """m; takes the place of what the file says; the larger, the less heights weigh"""
     bias_std_m: NotNegative = 0.0
@@ -56,6 +59,8 @@ class HeadingEntry(SensorEntry):
 
 class OdometerEntry(SensorEntry):
     """The speed of an encoder, and that the vehicle moves neither sideways nor up at `position_m`."""
+
+    FIELDS: ClassVar[Mapping[str, str]] = {"scale_std": "offset_std"}
 
     std_m_s: Positive | None = None
     """of the speed, m/s; takes the place of what the file says; the larger, the less speeds weigh"""

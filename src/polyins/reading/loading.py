@@ -11,6 +11,7 @@ import numpy as np
 
 from polyins.checks import faults, stream_checks, wheel_checks
 from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_configuration
+from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
 from polyins.model.recording import FilterOptions, ImuStream, Offset, Recording
@@ -97,8 +98,8 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     `wheels_known`: check that wheels turn as declared; what calibrates them needs not know yet.
     """
     notes = wheel_checks.check_settings(config, document)
-    read = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
-    imus, streams, warnings = zip(*read, strict=True)
+    mounted = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
+    imus, streams, warnings = zip(*mounted, strict=True)
     notes += _one_by_kind([text for texts in warnings for text in texts])
     faults.check_alive(streams)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
@@ -142,7 +143,7 @@ def assemble(
         geodetic=bool(geodetic),
         outages=outage_intervals(config, document, span, gnss),
         start=start,
-        options=_filter_options(config),
+        options=read(config.filter, FilterOptions, nonholonomic=constraint_of(config)),
         name=config.name,
         warnings=(*notes, *texts),
         aiding=aiding,
@@ -171,7 +172,8 @@ def without_data(config: Config, document: Document) -> tuple[Recording, tuple[s
     geodetic = config.gnss is not None and config.gnss.plane_origin is None
     if config.start.position:
         geodetic = config.start.position.geodetic
-    rig, options = _rig(config, document, tuple(imus)), _filter_options(config)
+    rig = _rig(config, document, tuple(imus))
+    options = read(config.filter, FilterOptions, nonholonomic=constraint_of(config))
     recording = Recording(rig, (), geodetic=geodetic, start=start, options=options, name=config.name)
     return recording, (*notes, *texts, *_not_live(config))
 
@@ -223,18 +225,6 @@ def _one_by_kind(notes: list[str]) -> list[str]:
         f"{found[0]}{f' and {len(found) - 1} files more' if len(found) > 1 else ''}: {text}"
         for text, found in places.items()
     ]
-
-
-def _filter_options(config: Config) -> FilterOptions:
-    return FilterOptions(
-        gate_limit=config.filter.gate_limit,
-        gate_reopen_after=config.filter.gate_reopen_after,
-        gnss_snap=config.filter.gnss_snap_s,
-        gravity=config.filter.gravity_m_s2,
-        rolling=config.filter.rolling.options(),
-        nonholonomic=constraint_of(config),
-        standstill=None if config.filter.standstill is None else config.filter.standstill.options(),
-    )
 
 
 def _one_kind(known: bool | None, new: bool, place: str) -> bool:

@@ -12,11 +12,19 @@ from pathlib import Path as FilePath
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.config.units import read
 from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
-from polyins.model.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
-from polyins.model.rig import DEG, Imu
-from polyins.reading.imu_stream import noise_grade
+from polyins.model.recording import (
+    FilterOptions,
+    GnssStream,
+    ImuStream,
+    Recording,
+    Reference,
+    RollingOptions,
+    StartOptions,
+)
+from polyins.model.rig import DEG, Imu, NoiseGrade
 from polyins.simulation import gnss
 from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Road
@@ -164,7 +172,7 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
         geodetic=scenario.earth == "turning",
         outages=scenario.outage_intervals(),
         start=_start(scenario, run),
-        options=FilterOptions(gravity=scenario.gravity_m_s2, rolling=scenario.rolling.options()),
+        options=FilterOptions(gravity=scenario.gravity_m_s2, rolling=read(scenario.rolling, RollingOptions)),
         name=scenario.name,
         warnings=(*run.path.warnings, *scenario.without_effect(), *too_short),
         config_text=write_yaml(scenario.model_dump(mode="json")),
@@ -216,7 +224,7 @@ def _sense(
 ) -> tuple[Imu, ImuStream, TrueErrors]:
     """Return an IMU as it is configured, what it puts out, turned into array axes as a reader does, and its errors."""
     scenario, time = run.scenario, run.time
-    imperfections, grade = scenario.errors.imperfections(), noise_grade(scenario.noise)
+    imperfections, grade = scenario.errors.imperfections(), read(scenario.noise, NoiseGrade)
     dtheta, dvel = run.sensed(imu)
     errors = draw_errors(time[-1], grade, imperfections, rng, shared=shared, number=number)
     dtheta, dvel = corrupt(

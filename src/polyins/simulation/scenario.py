@@ -27,11 +27,12 @@ from polyins.config import (
     validated,
 )
 from polyins.config.fields import blame
+from polyins.config.units import read
 from polyins.config.yaml_document import read_yaml
 from polyins.model.axes import axes_matrix
 from polyins.model.recording import FilterOptions
-from polyins.model.rig import DEG, Imu, Rig
-from polyins.reading.imu_stream import initial_std, noise_grade
+from polyins.model.rig import Imu, NoiseGrade, Rig
+from polyins.reading.imu_stream import initial_std
 from polyins.simulation import earth
 from polyins.simulation.drive_scenario import Drive, Replay
 from polyins.simulation.error_scenario import Errors as Errors
@@ -260,16 +261,13 @@ class Scenario(Section):
 
     def start_position(self) -> Array:
         """Return where the path starts, in the world's coordinates, shape (3,)."""
-        place = self.start
-        if place is None:
-            return np.array(START) if self.earth == "turning" else np.zeros(3)
-        if place.geodetic:
-            return np.array([place.latitude_deg, place.longitude_deg, place.height_m], dtype=float) * [DEG, DEG, 1.0]
-        return np.array([place.north_m, place.east_m, place.height_m], dtype=float)
+        if self.start is not None:
+            return self.start.coordinates()
+        return np.array(START) if self.earth == "turning" else np.zeros(3)
 
     def rig(self) -> Rig:
         """Return what is mounted where: the IMUs on the body, then those on the wheels."""
-        grade = noise_grade(self.filter_noise or self.noise)
+        grade = read(self.filter_noise or self.noise, NoiseGrade)
         name = "body" if self.wheels else "imu"
         module = "body" if self.wheels and self.imus.pitch_m == 0.0 else ""
         if self.rulers:
