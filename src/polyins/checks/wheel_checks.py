@@ -89,8 +89,10 @@ def check_settings(config: Config, document: Document) -> list[str]:
             place = document.place(["imus", index, "position_m"])
             warnings.append(f"{place}: IMU {imu.name} is on the middle line; is its wheel left or right of it?")
     if wheels and all(wheel.steering for _, _, wheel in wheels):
-        place = document.place(["imus", wheels[0][0], "wheel", "steering"])
-        raise InputError(f"{place}: all wheels with an IMU are steered; expected one that is not, to give speed")
+        raise document.error(
+            ["imus", wheels[0][0], "wheel", "steering"],
+            "all wheels with an IMU are steered; expected one that is not, to give speed",
+        )
     _check_modules(config, document)
     return warnings
 
@@ -98,24 +100,26 @@ def check_settings(config: Config, document: Document) -> list[str]:
 def _check_size(index: int, wheel: WheelEntry, document: Document) -> None:
     keys: list[Key] = ["imus", index, "wheel"]
     if wheel.radius_m > MAX_RADIUS_M:
-        raise InputError(f"{document.place([*keys, 'radius_m'])}: is {wheel.radius_m:g}; expected metres")
+        raise document.error([*keys, "radius_m"], f"is {wheel.radius_m:g}; expected metres")
     arm = float(np.linalg.norm(wheel.lever_arm_m))
     if arm > wheel.radius_m:
-        place = document.place([*keys, "lever_arm_m"])
-        raise InputError(f"{place}: is {arm:.3g} m long; expected metres, within the radius, {wheel.radius_m:g} m")
+        raise document.error(
+            [*keys, "lever_arm_m"], f"is {arm:.3g} m long; expected metres, within the radius, {wheel.radius_m:g} m"
+        )
     if max(abs(tilt) for tilt in wheel.tilt_deg) > MAX_TILT_DEG:
-        place = document.place([*keys, "tilt_deg"])
-        raise InputError(f"{place}: is {list(wheel.tilt_deg)}; expected at most {MAX_TILT_DEG:g} deg off spin_axis")
+        raise document.error(
+            [*keys, "tilt_deg"], f"is {list(wheel.tilt_deg)}; expected at most {MAX_TILT_DEG:g} deg off spin_axis"
+        )
 
 
 def _check_side(index: int, imu: ImuEntry, wheel: WheelEntry, document: Document) -> None:
     right = imu.position_m[1]
     if wheel.side is None or right == 0.0 or (right > 0.0) == (wheel.side == "right"):
         return
-    place = document.place(["imus", index, "wheel", "side"])
-    raise InputError(
-        f"{place}: is {wheel.side}, and position_m is {list(imu.position_m)}; expected y above zero on the right, "
-        "below on the left"
+    raise document.error(
+        ["imus", index, "wheel", "side"],
+        f"is {wheel.side}, and position_m is {list(imu.position_m)}; expected y above zero on the right, "
+        "below on the left",
     )
 
 
@@ -128,10 +132,10 @@ def _check_modules(config: Config, document: Document) -> None:
         mixed = (imu.wheel is None) != (other.wheel is None)
         if mixed or (imu.wheel is not None and apart > SAME_WHEEL_M):
             where = "on a wheel and on the body" if mixed else f"on wheels {apart:.3g} m apart"
-            place = document.place(["imus", index, "module"])
-            raise InputError(
-                f"{place}: IMU {imu.name} shares module {imu.module!r} with IMU {other.name}, {where}; expected chips "
-                "of one board"
+            raise document.error(
+                ["imus", index, "module"],
+                f"IMU {imu.name} shares module {imu.module!r} with IMU {other.name}, {where}; expected chips "
+                "of one board",
             )
 
 

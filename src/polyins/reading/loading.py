@@ -70,7 +70,7 @@ def names_of(settings: Sequence[Settings]) -> list[str]:
     for name, (_, document, _) in zip(own, settings, strict=True):
         path = document.path.resolve()
         if Path(name).name != name:
-            raise InputError(f"{document.place(['name'])}: is {name!r}; expected what may be the name of a folder")
+            raise document.error(["name"], f"is {name!r}; expected what may be the name of a folder")
         longer = name if own.count(name) == 1 else f"{path.parent.name}/{name}"
         if longer in names:
             raise InputError(
@@ -159,11 +159,13 @@ def without_data(config: Config, document: Document) -> tuple[Recording, tuple[s
     notes = wheel_checks.check_settings(config, document)
     for index, entry in enumerate(config.imus):
         if entry.time_offset:
-            place = document.place(["imus", index, "time_offset"])
-            raise InputError(f"{place}: is found from a whole recording; expected clock_offset_s")
+            raise document.error(
+                ["imus", index, "time_offset"], "is found from a whole recording; expected clock_offset_s"
+            )
     if config.start.heading_from == "reference":
-        place = document.place(["start", "heading_from"])
-        raise InputError(f"{place}: is reference, which live data have not; expected heading_deg or gnss-course")
+        raise document.error(
+            ["start", "heading_from"], "is reference, which live data have not; expected heading_deg or gnss-course"
+        )
     imus = []
     for index, entry in enumerate(config.imus):
         with document.at(["imus", index]):
@@ -196,8 +198,9 @@ def _rig(config: Config, document: Document, imus: tuple[Imu, ...]) -> Rig:
         antenna = np.array(config.gnss.antenna_position_m) if config.gnss else np.zeros(3)
         rig = Rig(imus, antenna, sensors_of(config, document))
     if config.odometer is not None and rig.has_wheels:
-        place = document.place(["odometer"])
-        raise InputError(f"{place}: is given, and an IMU on a wheel, which shows the speed as well; expected one")
+        raise document.error(
+            ["odometer"], "is given, and an IMU on a wheel, which shows the speed as well; expected one"
+        )
     return rig
 
 

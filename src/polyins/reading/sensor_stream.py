@@ -83,8 +83,7 @@ def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tupl
     warnings = stream_checks.check_within(source, kind, time, span)
     given = std_of(entry)
     if given is None and not std:
-        place = document.place([kind])
-        raise InputError(f"{place}: {source.path} has no std; expected a column std or {key_of(type(entry), 'std')}")
+        raise document.error([kind], f"{source.path} has no std; expected a column std or {key_of(type(entry), 'std')}")
     stds = std[0] * unit if given is None else np.full(len(time), given)
     stream_checks.check_finite(source, {"std": stds})
     for row in np.flatnonzero(stds <= 0.0)[:1]:
@@ -98,8 +97,7 @@ def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorC
     units = UNITS[kind]
     unit: str = columns.unit or next(iter(units))
     if unit not in units:
-        place = document.place([kind, "columns", "unit"])
-        raise InputError(f"{place}: is {unit} for {kind}; expected {' or '.join(units)}")
+        raise document.error([kind, "columns", "unit"], f"is {unit} for {kind}; expected {' or '.join(units)}")
     return columns, units[unit]
 
 

@@ -32,13 +32,13 @@ def _check_times(start: StartEntry, document: Document, span: Span) -> None:
     begin = span[0] if start.time_s is None else start.time_s
     still = start.static_interval_s
     if not span[0] <= begin < span[1]:
-        raise InputError(f"{document.place(['start', 'time_s'])}: is {begin:.3f}; expected a time {covered}")
+        raise document.error(["start", "time_s"], f"is {begin:.3f}; expected a time {covered}")
     if start.end_time_s is not None and start.end_time_s <= begin:
-        place = document.place(["start", "end_time_s"])
-        raise InputError(f"{place}: is {start.end_time_s:.3f}; expected a time after the start, {begin:.3f} s")
+        raise document.error(
+            ["start", "end_time_s"], f"is {start.end_time_s:.3f}; expected a time after the start, {begin:.3f} s"
+        )
     if still is not None and not span[0] <= still[0] < still[1] <= span[1]:
-        place = document.place(["start", "static_interval_s"])
-        raise InputError(f"{place}: is {list(still)}; expected [from, to] {covered}")
+        raise document.error(["start", "static_interval_s"], f"is {list(still)}; expected [from, to] {covered}")
 
 
 def outage_intervals(config: Config, document: Document, span: Span, gnss: GnssStream | None) -> tuple[Span, ...]:
@@ -46,40 +46,40 @@ def outage_intervals(config: Config, document: Document, span: Span, gnss: GnssS
 
     Raises InputError for outages without GNSS, outside the data, overlapping, or that end before they begin.
     """
-    place = document.place(["outages"])
     if not config.outages:
         return ()
-    if gnss is None:
-        raise InputError(f"{place}: given without gnss; expected both or neither")
-    if isinstance(config.outages, OutageSchedule):
-        first_fix = float(gnss.time[gnss.time >= span[0]][0])
-        begin = first_fix if config.start.time_s is None else config.start.time_s
-        end = min(span[1], float(gnss.time[-1]), np.inf if config.start.end_time_s is None else config.start.end_time_s)
-        return _scheduled(config.outages, begin, end, place)
-    outages = sorted(config.outages)
-    _check_outages(outages, place, span)
+    with document.at(["outages"]):
+        if gnss is None:
+            raise InputError("given without gnss; expected both or neither")
+        if isinstance(config.outages, OutageSchedule):
+            first_fix = float(gnss.time[gnss.time >= span[0]][0])
+            begin = first_fix if config.start.time_s is None else config.start.time_s
+            end_time = np.inf if config.start.end_time_s is None else config.start.end_time_s
+            return _scheduled(config.outages, begin, min(span[1], float(gnss.time[-1]), end_time))
+        outages = sorted(config.outages)
+        _check_outages(outages, span)
     return tuple(outages)
 
 
-def _check_outages(outages: list[Span], place: str, span: Span) -> None:
+def _check_outages(outages: list[Span], span: Span) -> None:
     """`outages` is in order of time."""
     covered = f"within the data, {span[0]:.3f} to {span[1]:.3f} s"
     previous_end = -np.inf
     for a, b in outages:
         if not a < b:
-            raise InputError(f"{place}: [{a:g}, {b:g}] ends before it begins; expected [from, to]")
+            raise InputError(f"[{a:g}, {b:g}] ends before it begins; expected [from, to]")
         if a < span[0] or b > span[1]:
-            raise InputError(f"{place}: [{a:g}, {b:g}] is outside the data; expected times {covered}")
+            raise InputError(f"[{a:g}, {b:g}] is outside the data; expected times {covered}")
         if a < previous_end:
-            raise InputError(f"{place}: [{a:g}, {b:g}] overlaps the outage before; expected outages apart")
+            raise InputError(f"[{a:g}, {b:g}] overlaps the outage before; expected outages apart")
         previous_end = b
 
 
-def _scheduled(schedule: OutageSchedule, begin: float, end: float, place: str) -> tuple[Span, ...]:
+def _scheduled(schedule: OutageSchedule, begin: float, end: float) -> tuple[Span, ...]:
     outages = schedule.intervals(begin, end)
     if not outages:
         raise InputError(
-            f"{place}: no outage of {schedule.length_s:g} s fits after {schedule.first_begin(begin):.3f} s; "
-            f"expected it to end with the data, at {end:.3f} s"
+            f"no outage of {schedule.length_s:g} s fits after {schedule.first_begin(begin):.3f} s; expected it to end "
+            f"with the data, at {end:.3f} s"
         )
     return outages
