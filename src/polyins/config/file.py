@@ -32,20 +32,23 @@ class Standstill(Section):
     velocity_std_m_s: Positive = REST.velocity_std
     """m/s; the larger, the less a standstill weighs"""
     rate_std_deg_s: Positive = in_unit(UNITS["deg_s"], REST.rate_std)
-    """of the mean rate, deg/s; above what an idling engine shakes"""
+    """of the mean rate, deg/s; the larger, the less a standstill weighs; above what an idling engine shakes"""
 
 
 class Filter(Section):
     """What the filter is told beyond the sensors."""
 
     gate_limit: Positive | None = FilterOptions.gate_limit
-    """a fix is rejected whose normalized innovation squared, at fourfold prediction std, exceeds this; null: none is"""
+    """a fix is rejected whose normalized innovation squared, at fourfold prediction std, exceeds
+    this; the larger, the fewer are; null: none is"""
     gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = FilterOptions.gate_reopen_after
-    """after that many rejections in a row the next fix is believed"""
+    """after that many rejections in a row the next fix is believed; the larger, the longer a wrong state
+    keeps good fixes out"""
     gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0, le=0.1)] = FilterOptions.gnss_snap
-    """a fix nearer than this to an IMU epoch is applied at that epoch, s"""
+    """a fix nearer than this to an IMU epoch is applied at that epoch, s; the larger, the fewer intervals are split,
+    and the farther a fix is moved"""
     gravity_m_s2: Positive = FilterOptions.gravity
-    """on a local tangent plane only, m/s^2"""
+    """on a local tangent plane only, m/s^2; one that is too large shows as an acceleration downwards"""
     rolling: Rolling = Rolling()
     """how wheels aid the filter"""
     standstill: Standstill | None = None

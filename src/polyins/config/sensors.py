@@ -30,7 +30,7 @@ class SensorEntry(Section):
     columns: SensorColumns | None = None
     """of the table; without it time_s and height_m, heading_deg or speed_m_s"""
     clock_offset_s: Number = 0.0
-    """added to the stamps, s"""
+    """added to the stamps, s; the larger, the later the values count"""
     position_m: Triple = ORIGIN
     """the point whose height or velocity it shows, from the array's origin: forward, right, down, m"""
 
@@ -43,7 +43,8 @@ class HeightEntry(SensorEntry):
     std_m: Positive | None = None
     """m; takes the place of what the file says; the larger, the less heights weigh"""
     bias_std_m: NotNegative = 0.0
-    """of the difference from the height of GNSS at the start, m; above zero the filter estimates it"""
+    """of the difference from the height of GNSS at the start, m; above zero the filter estimates it; the larger, the
+    more GNSS decides on the height"""
     bias_random_walk_m_sqrt_s: NotNegative = 0.0
     """of that difference; the larger, the faster the estimate follows the weather"""
 
@@ -54,7 +55,8 @@ class HeadingEntry(SensorEntry):
     std_deg: Positive | None = None
     """deg; takes the place of what the file says; the larger, the less headings weigh"""
     offset_std_deg: NotNegative = 0.0
-    """of a constant offset from the heading of the array, deg; above zero the filter estimates it"""
+    """of a constant offset from the heading of the array, deg; above zero the filter estimates it; the larger, the less
+    headings say of the array's until it is known"""
 
 
 class OdometerEntry(SensorEntry):
@@ -65,10 +67,13 @@ class OdometerEntry(SensorEntry):
     std_m_s: Positive | None = None
     """of the speed, m/s; takes the place of what the file says; the larger, the less speeds weigh"""
     right_std_m_s: NotNegative = 0.1
-    """of the velocity to the right, which is taken for zero, m/s; 0: it is not"""
+    """of the velocity to the right, which is taken for zero, m/s; the larger, the more slip is allowed for; 0: it is
+    not taken for zero"""
     down_std_m_s: NotNegative = 0.1
-    """of the velocity down, likewise, m/s"""
+    """of the velocity down, likewise, m/s; the larger, the more the vehicle may bounce"""
     scale_std: NotNegative = 0.0
-    """of a constant relative error of the speed; above zero the filter estimates it"""
+    """of a constant relative error of the speed; above zero the filter estimates it; the larger, the more GNSS decides
+    on the scale"""
     constraint_interval_s: Positive | None = None
-    """from one update by the latter two alone to the next, s; without it only where there is a speed"""
+    """from one update by right_std_m_s and down_std_m_s alone to the next, s; the larger, the less they weigh; without
+    it only where there is a speed"""

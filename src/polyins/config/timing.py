@@ -69,11 +69,11 @@ class StartEntry(Section):
     static_interval_s: Pair | None = None
     """the array stands still from, to, s; without it looked for"""
     position_std_m: Spread | None = None
-    """north, east, down, m"""
+    """north, east, down, m; the larger, the faster aids correct the position at the start"""
     velocity_std_m_s: Spread | None = None
-    """north, east, down, m/s"""
+    """north, east, down, m/s; the larger, the faster aids correct the velocity at the start"""
     attitude_std_deg: Spread | None = None
-    """roll, pitch, heading, deg"""
+    """roll, pitch, heading, deg; the larger, the faster aids correct the attitude at the start"""
     estimate_gyro_bias: bool = True
     """take the mean of the gyros over a static interval as their bias"""
 
