@@ -15,8 +15,8 @@ from polyins.config.units import key_of, matches, read, split, write
 from polyins.config.yaml_document import read_yaml, write_yaml
 from polyins.model.recording import FilterOptions, RollingOptions, StandstillOptions, StartOptions
 from polyins.model.rig import DEG, AidingSensor, Imu, ImuErrors, NoiseGrade, Wheel
-from polyins.simulation.drive_scenario import Drive, Replay
-from polyins.simulation.error_scenario import Errors
+from polyins.simulation.drive_scenario import Drive, ReplayedDrive
+from polyins.simulation.error_scenario import SensorErrors
 from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.path import Driving
 from polyins.simulation.replay import Ride
@@ -109,7 +109,7 @@ SETTINGS: list[tuple[type[config.Section], st.SearchStrategy[Any], dict[str, Any
     (config.HeightEntry, sensors("height", walks=True), {}),
     (config.HeadingEntry, sensors("heading"), {}),
     (config.OdometerEntry, sensors("odometer"), {}),
-    (Errors, imperfections, {}),
+    (SensorErrors, imperfections, {}),
 ]
 """a section, what it gives, and what it needs besides"""
 
@@ -148,9 +148,9 @@ def same(read: Any, value: Any) -> None:
         (config.StartEntry(), StartOptions()),
         (config.InitialErrors(), ImuErrors()),
         (config.WheelEntry(radius_m=0.1, spin_axis="x"), Wheel(0.1)),
-        (Errors(), Imperfections()),
+        (SensorErrors(), Imperfections()),
         (Drive(), Driving()),
-        (Replay(file="drive.pos"), Ride()),
+        (ReplayedDrive(file="drive.pos"), Ride()),
     ],
     ids=lambda item: type(item).__name__,
 )
@@ -172,8 +172,8 @@ OTHERWISE: dict[str, set[str]] = {
     "ImuEntry": {
         "format", "columns", "rate_hz", "clock_offset_s", "time_offset", "gyro_range_deg_s", "axes", "mount_deg", "file"
     },
-    "Replay": {"file", "from_s", "to_s", "position_std_m"},
-    "Errors": {"vibration_m_s2", "common_noise_share", "common_drift_share"},
+    "ReplayedDrive": {"file", "from_s", "to_s", "position_std_m"},
+    "SensorErrors": {"vibration_m_s2", "common_noise_share", "common_drift_share"},
     **{
         name: {"file", "columns", "clock_offset_s", key} for name, key in
         (("HeightEntry", "std_m"), ("HeadingEntry", "std_deg"))
@@ -200,9 +200,9 @@ OTHERWISE: dict[str, set[str]] = {
         (config.HeightEntry, AidingSensor),
         (config.HeadingEntry, AidingSensor),
         (config.OdometerEntry, AidingSensor),
-        (Errors, Imperfections),
+        (SensorErrors, Imperfections),
         (Drive, Driving),
-        (Replay, Ride),
+        (ReplayedDrive, Ride),
     ],
 )
 def test_every_field_has_a_key_and_every_key_reaches_one(section, kind):

@@ -12,7 +12,7 @@ from written_recordings import as_increments, still_imu
 
 from polyins.checks.stream_checks import check_imu, check_upright, upright_axes
 from polyins.errors import InputError
-from polyins.formats.rows import ImuRows, Source
+from polyins.formats.rows import ImuRows, RowSource
 from polyins.model.axes import axes_matrix, right_handed_axes
 
 UP = np.array([0.3, -0.5, -9.8])
@@ -49,7 +49,7 @@ def test_an_array_that_leans_is_upright(lean_deg: float, toward_deg: float) -> N
 
 
 def rows(values: np.ndarray) -> ImuRows:
-    return ImuRows(Source("imu.txt", 1), values[:, 0], values[:, 1:4], values[:, 4:7])
+    return ImuRows(RowSource("imu.txt", 1), values[:, 0], values[:, 1:4], values[:, 4:7])
 
 
 def test_vibration_and_turning_pass() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polyins.checks.faults import LONGEST_REPEAT, check_alive, clipped, without_faults
 from polyins.errors import InputError
-from polyins.formats.rows import ImuRows, Source
+from polyins.formats.rows import ImuRows, RowSource
 from polyins.model.recording import ImuStream
 
 RATE_HZ = 100.0
@@ -26,7 +26,7 @@ def noisy(seed: int = 1, count: int = 1000, noise: float = 1e-3) -> ImuRows:
 
 
 def rows(values: Array) -> ImuRows:
-    return ImuRows(Source("a.csv", 2), 100.0 + np.arange(len(values)) / RATE_HZ, values[:, :3], values[:, 3:])
+    return ImuRows(RowSource("a.csv", 2), 100.0 + np.arange(len(values)) / RATE_HZ, values[:, :3], values[:, 3:])
 
 
 def held(of: ImuRows, begin: int, end: int) -> ImuRows:
@@ -101,7 +101,7 @@ def test_rates_at_uneven_stamps_are_compared_as_rates() -> None:
     per_second = np.hstack([given_rows.dtheta, given_rows.dvel]) * RATE_HZ
     per_second[300:400] = per_second[299]
     steps = np.diff(stamps, prepend=0.0)[:, None]
-    kept, _ = without_faults(ImuRows(Source("a.csv"), stamps, *np.hsplit(per_second * steps, 2)), "left", 0.0)
+    kept, _ = without_faults(ImuRows(RowSource("a.csv"), stamps, *np.hsplit(per_second * steps, 2)), "left", 0.0)
     assert len(kept.time) == 900
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polyins.formats.rows import ImuRows, Source, without
+from polyins.formats.rows import ImuRows, RowSource, without
 
 STEP = 0.01
 
@@ -15,7 +15,7 @@ STEP = 0.01
 def constant(count: int) -> ImuRows:
     """Constant rates: 1 rad/s and 10 m/s^2."""
     time = STEP * np.arange(1, count + 1)
-    return ImuRows(Source("a"), time, np.full((count, 3), STEP), np.full((count, 3), 10 * STEP))
+    return ImuRows(RowSource("a"), time, np.full((count, 3), STEP), np.full((count, 3), 10 * STEP))
 
 
 @given(st.integers(1, 3), st.integers(1, 15))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from polyins.calibration.motion import Motion, Running
+from polyins.calibration.motion import Motion, RunningSums
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
 from polyins.model.recording import Array
@@ -38,7 +38,7 @@ class Mount:
     """rad, shape (3,)"""
 
 
-def mount(body: Motion, rolled: Running, height: Running | None, name: str) -> Mount:
+def mount(body: Motion, rolled: RunningSums, height: RunningSums | None, name: str) -> Mount:
     """Find what is left of the mounting angles of a body IMU whose stream is nearly forward-right-down.
 
     `rolled`: way, m, and upward yaw, rad, of the middle of the axle; `height`: of the antenna, m, None: the road is
@@ -65,7 +65,7 @@ def mount(body: Motion, rolled: Running, height: Running | None, name: str) -> M
     return Mount(angles, np.hypot(std, unknown))
 
 
-def _driving(body: Motion, rolled: Running, height: Running | None) -> Array:
+def _driving(body: Motion, rolled: RunningSums, height: RunningSums | None) -> Array:
     """Return the middles of windows in which all is known and the vehicle drives, s."""
     spans = [(float(body.edges[0]), float(body.edges[-1])), rolled.span, *([height.span] if height else [])]
     reach = 0.5 * (WINDOW + SPEED_WINDOW)
@@ -76,7 +76,7 @@ def _driving(body: Motion, rolled: Running, height: Running | None) -> Array:
     return np.asarray(middle[np.abs(way) > LEAST_SPEED * WINDOW])
 
 
-def _speed(rolled: Running, at: Array) -> Array:
+def _speed(rolled: RunningSums, at: Array) -> Array:
     return rolled.between(at - 0.5 * SPEED_WINDOW, at + 0.5 * SPEED_WINDOW)[:, 0] / SPEED_WINDOW
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.formats.rows import ImuRows, Source, Track
+from polyins.formats.rows import ImuRows, RowSource, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
 from polyins.model.recording import Array, usual_interval
 from polyins.model.rig import STANDARD_GRAVITY
@@ -109,7 +109,7 @@ def check_track(track: Track, what: str) -> tuple[str, ...]:
     return track.warnings
 
 
-def check_std(source: Source, std: Array) -> None:
+def check_std(source: RowSource, std: Array) -> None:
     """Raise InputError for standard deviations of a position that are not positive metres."""
     check_finite(source, {"position std": std})
     for row in np.flatnonzero((std <= 0.0).any(axis=1))[:1]:
@@ -139,7 +139,7 @@ def check_common_span(spans: dict[str, tuple[float, float]]) -> tuple[float, flo
     )
 
 
-def check_within(source: Source, what: str, time: Array, span: tuple[float, float]) -> tuple[str, ...]:
+def check_within(source: RowSource, what: str, time: Array, span: tuple[float, float]) -> tuple[str, ...]:
     """Return a warning if part of a stream lies outside the IMUs' span; raise InputError if all of it does."""
     inside = (time >= span[0]) & (time <= span[1])
     if not inside.any():
@@ -153,7 +153,7 @@ def check_within(source: Source, what: str, time: Array, span: tuple[float, floa
     return (f"{source.path}: {count} of {len(time)} {what} rows lie outside the IMUs' span and are not used",)
 
 
-def check_finite(source: Source, blocks: dict[str, Array], first_row: int = 0) -> None:
+def check_finite(source: RowSource, blocks: dict[str, Array], first_row: int = 0) -> None:
     """Raise InputError for the first row, in blocks of shape (T,) or (T, k) by name, that is not all numbers.
 
     `first_row`: of the blocks in the file.
@@ -168,7 +168,7 @@ def check_finite(source: Source, blocks: dict[str, Array], first_row: int = 0) -
             raise InputError(f"{place}: {name} is missing or not a number; expected a number")
 
 
-def check_order(source: Source, time: Array, remedy: str = "", first_row: int = 0) -> None:
+def check_order(source: RowSource, time: Array, remedy: str = "", first_row: int = 0) -> None:
     """Raise InputError for stamps, shape (T,), that do not increase; `remedy` ends the message."""
     steps = np.diff(time)
     if np.all(steps > 0.0):

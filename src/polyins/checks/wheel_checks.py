@@ -48,7 +48,7 @@ LIKENESS = 0.02
 
 
 @dataclass(frozen=True)
-class _Wheel:
+class _ConfiguredWheel:
     """An IMU on a wheel, its motion, and where it is configured."""
 
     index: int
@@ -173,12 +173,12 @@ def check_motion(
     return warnings
 
 
-def _wheel(index: int, imu: Imu, entry: WheelEntry, stream: ImuStream) -> _Wheel:
+def _wheel(index: int, imu: Imu, entry: WheelEntry, stream: ImuStream) -> _ConfiguredWheel:
     rate = stream.dtheta / intervals(stream.time)[:, None]
-    return _Wheel(index, imu, entry, stream.time, rate, -np.cumsum(stream.dtheta[:, 0]))
+    return _ConfiguredWheel(index, imu, entry, stream.time, rate, -np.cumsum(stream.dtheta[:, 0]))
 
 
-def _check_sampling(wheel: _Wheel, document: Document) -> list[str]:
+def _check_sampling(wheel: _ConfiguredWheel, document: Document) -> list[str]:
     step = float(np.median(np.diff(wheel.time)))
     turn = float(np.quantile(np.linalg.norm(wheel.rate, axis=1), 0.999)) * step
     if turn <= COARSE_RAD:
@@ -189,7 +189,7 @@ def _check_sampling(wheel: _Wheel, document: Document) -> list[str]:
     return [f"{text}; what happens between samples is lost, expected at most {COARSE_RAD:g}"]
 
 
-def _check_all_turn(wheels: list[_Wheel], document: Document) -> None:
+def _check_all_turn(wheels: list[_ConfiguredWheel], document: Document) -> None:
     paces = [wheel.pace for wheel in wheels]
     for wheel, pace in zip(wheels, paces, strict=True):
         if pace < STANDS * max(paces):
@@ -199,7 +199,7 @@ def _check_all_turn(wheels: list[_Wheel], document: Document) -> None:
             )
 
 
-def _check_axis(wheel: _Wheel, document: Document) -> list[str]:
+def _check_axis(wheel: _ConfiguredWheel, document: Document) -> list[str]:
     """Compare the axis that the IMU turns about with the one declared."""
     fast = wheel.rate[np.linalg.norm(wheel.rate, axis=1) > TURNS_RAD_S]
     spin = np.linalg.eigh(fast.T @ fast)[1][:, -1]
@@ -225,7 +225,7 @@ def _named(right: Vector, k: int) -> str:
     return ("-" if right[k] < 0.0 else "") + "xyz"[k]
 
 
-def _check_direction(wheel: _Wheel, document: Document) -> None:
+def _check_direction(wheel: _ConfiguredWheel, document: Document) -> None:
     net, whole = wheel.way[-1], float(np.sum(np.abs(np.diff(wheel.way))))
     if net > -ONE_WAY * whole:
         return
@@ -237,7 +237,7 @@ def _check_direction(wheel: _Wheel, document: Document) -> None:
     )
 
 
-def _check_ways(wheels: list[_Wheel], document: Document) -> list[str]:
+def _check_ways(wheels: list[_ConfiguredWheel], document: Document) -> list[str]:
     """Compare how far the wheels roll while all are recorded."""
     if len(wheels) < 2:
         return []
@@ -254,7 +254,7 @@ def _check_ways(wheels: list[_Wheel], document: Document) -> list[str]:
     ]
 
 
-def _check_clocks(wheels: list[_Wheel], document: Document) -> list[str]:
+def _check_clocks(wheels: list[_ConfiguredWheel], document: Document) -> list[str]:
     """Look whether the speeds of two wheels are more alike with one of them shifted in time."""
     first = wheels[0]
     return [
@@ -265,7 +265,7 @@ def _check_clocks(wheels: list[_Wheel], document: Document) -> list[str]:
     ]
 
 
-def _lag(a: _Wheel, b: _Wheel) -> float:
+def _lag(a: _ConfiguredWheel, b: _ConfiguredWheel) -> float:
     """Return by how much b is later than a, s, by how both speed up and slow down; 0 if not by much."""
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     grid = np.arange(begin, end, CLOCK_STEP_S)
@@ -276,14 +276,14 @@ def _lag(a: _Wheel, b: _Wheel) -> float:
     product = np.fft.irfft(np.fft.rfft(two, size) * np.fft.rfft(one[::-1], size), size)
     likeness = product / max(float(np.linalg.norm(one) * np.linalg.norm(two)), 1e-12)
     lags = np.arange(1 - len(one), len(two)) * CLOCK_STEP_S
-    near = np.abs(lags) <= LARGEST_LAG_S
-    best = int(np.argmax(np.where(near, likeness, -1.0)))
+    plausible = np.abs(lags) <= LARGEST_LAG_S
+    best = int(np.argmax(np.where(plausible, likeness, -1.0)))
     alike = likeness[best] > likeness[lags == 0.0][0] + LIKENESS
     return float(lags[best]) if alike and abs(lags[best]) >= LAG_SHOWS_S else 0.0
 
 
 def _check_steering(
-    wheels: list[_Wheel], imus: tuple[Imu, ...], streams: tuple[ImuStream, ...], document: Document
+    wheels: list[_ConfiguredWheel], imus: tuple[Imu, ...], streams: tuple[ImuStream, ...], document: Document
 ) -> list[str]:
     """Warn of wheels that yaw otherwise than the vehicle although they are declared not to be steered."""
     chosen = [index for index, imu in enumerate(imus) if imu.wheel is None or not imu.wheel.steering]
@@ -296,7 +296,7 @@ def _check_steering(
     ]
 
 
-def _check_radius(wheel: _Wheel, gnss: GnssStream, geodetic: bool, document: Document) -> list[str]:
+def _check_radius(wheel: _ConfiguredWheel, gnss: GnssStream, geodetic: bool, document: Document) -> list[str]:
     """Compare the way rolled with the way between fixes, where it drives."""
     inside = (gnss.time >= wheel.time[0]) & (gnss.time <= wheel.time[-1])
     time, position = gnss.time[inside], gnss.position[inside]

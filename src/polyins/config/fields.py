@@ -103,7 +103,7 @@ class Section(BaseModel):
     def _know_every_key(cls, values: Any) -> Any:
         for key in values if isinstance(values, dict) else ():
             if key not in cls.model_fields:
-                near = difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.5)
-                hint = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(cls.model_fields)}"
+                similar = difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.5)
+                hint = f"did you mean {similar[0]}?" if similar else f"expected one of {', '.join(cls.model_fields)}"
                 raise PydanticCustomError("unknown_key", "unknown key; {hint}", {"key": key, "hint": hint})
         return values

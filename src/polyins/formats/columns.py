@@ -14,7 +14,7 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, read_bytes, read_head
 from polyins.formats.arrow_arrays import to_numpy
-from polyins.formats.rows import Source
+from polyins.formats.rows import RowSource
 from polyins.model.recording import Array
 
 Column = str | int
@@ -25,7 +25,7 @@ HEAD_BYTES = 16384
 
 
 @dataclass(frozen=True)
-class Layout:
+class Dialect:
     """How a text table is built."""
 
     delimiter: str
@@ -42,17 +42,17 @@ def column_names(path: str | Path) -> tuple[str, ...]:
 
 def read_columns(
     path: str | Path, wanted: Sequence[Column], *, header_has: str = "", text_is_nan: bool = False
-) -> tuple[Source, list[Array]]:
+) -> tuple[RowSource, list[Array]]:
     """Read the wanted columns, each of shape (T,); what is missing in a cell is NaN.
 
     `header_has`: a name by which the header line is known where other lines come before it. `text_is_nan`: cells that
     are not numbers are NaN instead of an error. Raises InputError that names the missing column or the bad line.
     """
     if find(path).suffix != ".gz" and read_head(path, 4) == PARQUET_MAGIC:
-        return Source(str(find(path))), _parquet_columns(path, wanted)
+        return RowSource(str(find(path))), _parquet_columns(path, wanted)
     content = read_bytes(path)
     if content[:4] == PARQUET_MAGIC:
-        return Source(str(find(path))), _parquet_columns(path, wanted, content)
+        return RowSource(str(find(path))), _parquet_columns(path, wanted, content)
     table = layout(path, content, header_has)
     if not content.isascii():
         content = content.decode(errors="replace").encode()
@@ -60,10 +60,10 @@ def read_columns(
         content = re.sub(rb"(?m)^[ \t]+|[ \t]+$", b"", content)
         content = re.sub(rb"[ \t]+", b" ", content)
     places = [_place(find(path), table.names, column) for column in wanted]
-    return Source(str(find(path)), table.first_line), _text_columns(find(path), content, table, places, text_is_nan)
+    return RowSource(str(find(path)), table.first_line), _text_columns(find(path), content, table, places, text_is_nan)
 
 
-def layout(path: str | Path, content: bytes, header_has: str = "") -> Layout:
+def layout(path: str | Path, content: bytes, header_has: str = "") -> Dialect:
     """Find delimiter, header and first row of a text table."""
     lines = content[:HEAD_BYTES].decode("utf-8-sig", errors="replace").splitlines()
     start = next((n for n, line in enumerate(lines) if header_has in line and not _is_preamble(line)), None)
@@ -75,11 +75,11 @@ def layout(path: str | Path, content: bytes, header_has: str = "") -> Layout:
     if any(_is_number(text) for text in fields):
         commented = _split(lines[start - 1].lstrip("#% "), delimiter) if start else []
         names = commented if len(commented) == len(fields) else [""] * len(fields)
-        return Layout(delimiter, tuple(names), start + 1)
+        return Dialect(delimiter, tuple(names), start + 1)
     if start + 1 >= len(lines):
         raise InputError(f"{find(path)}: has a header and no rows; expected data")
     extra = len(_split(lines[start + 1], delimiter)) - len(fields)
-    return Layout(delimiter, tuple(fields + [""] * max(extra, 0)), start + 2)
+    return Dialect(delimiter, tuple(fields + [""] * max(extra, 0)), start + 2)
 
 
 def _is_preamble(line: str) -> bool:
@@ -106,13 +106,13 @@ def _place(path: Path, names: Sequence[str], column: Column) -> int:
         return column - 1
     if column not in names:
         present = [name for name in names if name]
-        near = difflib.get_close_matches(column, present, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(present) or '1, 2, ...'}"
+        similar = difflib.get_close_matches(column, present, n=1, cutoff=0.4)
+        hint = f"did you mean {similar[0]!r}?" if similar else f"expected one of {', '.join(present) or '1, 2, ...'}"
         raise InputError(f"{path}: no column {column!r}; {hint}")
     return names.index(column)
 
 
-def _text_columns(path: Path, content: bytes, table: Layout, places: list[int], text_is_nan: bool) -> list[Array]:
+def _text_columns(path: Path, content: bytes, table: Dialect, places: list[int], text_is_nan: bool) -> list[Array]:
     from pyarrow import ArrowInvalid, float64
 
     try:
@@ -125,7 +125,7 @@ def _text_columns(path: Path, content: bytes, table: Layout, places: list[int], 
     return [to_numpy(column) for column in columns]
 
 
-def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: Any) -> list[Any]:
+def _parse(path: Path, content: bytes, table: Dialect, places: list[int], kind: Any) -> list[Any]:
     """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them."""
     from pyarrow import ArrowInvalid, BufferReader, csv
 
@@ -154,7 +154,7 @@ def _parse(path: Path, content: bytes, table: Layout, places: list[int], kind: A
     return [parsed[name] for name in wanted]
 
 
-def _numbers(path: Path, table: Layout, place: int, cells: Any, text_is_nan: bool) -> Array:
+def _numbers(path: Path, table: Dialect, place: int, cells: Any, text_is_nan: bool) -> Array:
     """Convert cell by cell, to find the one that is not a number."""
     values = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells.to_pylist()):

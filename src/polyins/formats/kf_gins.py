@@ -12,7 +12,7 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, read_bytes, write_bytes
 from polyins.formats.arrow_arrays import to_numpy
-from polyins.formats.rows import ImuRows, Source, Track, intervals
+from polyins.formats.rows import ImuRows, RowSource, Track, intervals
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG
 
@@ -30,7 +30,7 @@ def read_imu(path: str | Path) -> ImuRows:
     content = read_bytes(path)
     text = is_text(content)
     rows = _numbers(path, content, {IMU_COLUMNS: "s, 3 rad, 3 m/s"}) if text else _binary(path, content)
-    return ImuRows(Source(str(find(path)), 1 if text else None), rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+    return ImuRows(RowSource(str(find(path)), 1 if text else None), rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
 
 def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
@@ -45,7 +45,7 @@ def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
     rows = _binary(path, content)
     time = np.arange(len(rows)) / rate_hz if rate_hz else rows[:, 0]
     increments = rows[:, 1:] * intervals(time)[:, None]
-    source = Source(str(find(path)))
+    source = RowSource(str(find(path)))
     return ImuRows(source, time, increments[:, :3], increments[:, 3:], gyro_unit="rad/s", accel_unit="m/s^2")
 
 
@@ -59,7 +59,7 @@ def read_gnss(path: str | Path) -> Track:
         13: "the same with velocity and its std",
     }
     rows = _numbers(path, read_bytes(path), wanted)
-    source = Source(str(find(path)), 1)
+    source = RowSource(str(find(path)), 1)
     if rows.shape[1] == 7:
         return Track(source, rows[:, 0], _radians(rows[:, 1:4], 2), position_std=rows[:, 4:7])
     return Track(
@@ -76,7 +76,7 @@ def read_nav(path: str | Path) -> Track:
     """Read a navigation result or truth: week, s, latitude, longitude (deg), height (m), velocity NED, angles (deg)."""
     rows = _numbers(path, read_bytes(path), {11: "week, s, lat, lon, h, vN, vE, vD, roll, pitch, heading"})
     return Track(
-        Source(str(find(path)), 1),
+        RowSource(str(find(path)), 1),
         rows[:, 1],
         _radians(rows[:, 2:5], 2),
         velocity=rows[:, 5:8],

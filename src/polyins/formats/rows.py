@@ -11,7 +11,7 @@ from polyins.model.recording import Array, usual_interval
 
 
 @dataclass(frozen=True)
-class Source:
+class RowSource:
     """Where rows came from, so that a message can name the line."""
 
     path: str
@@ -29,7 +29,7 @@ class Source:
 class ImuRows:
     """Increments over the interval that ends at the stamp, in sensor axes."""
 
-    source: Source
+    source: RowSource
     time: Array
     """s, shape (T,)"""
     dtheta: Array
@@ -49,7 +49,7 @@ class ImuRows:
 class Track:
     """Positions, and what else a receiver or a reference system gives."""
 
-    source: Source
+    source: RowSource
     time: Array
     """s, shape (M,)"""
     position: Array
@@ -75,7 +75,7 @@ class Track:
         """Return the track with just those rows; messages then name rows, not lines."""
         blocks = ("position_std", "velocity", "velocity_std", "attitude")
         given = {name: block[rows] for name in blocks if (block := getattr(self, name)) is not None}
-        source = Source(self.source.path)
+        source = RowSource(self.source.path)
         return replace(self, source=source, time=self.time[rows], position=self.position[rows], **given)
 
 

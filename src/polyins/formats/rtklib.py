@@ -13,7 +13,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_text
-from polyins.formats.rows import Source, Track
+from polyins.formats.rows import RowSource, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -57,7 +57,7 @@ def read_gnss(path: str | Path) -> Track:
     quality = Counter(int(q) for q in values[:, names.index("q")])
     counts = {QUALITIES.get(q, f"Q{q}"): count for q, count in sorted(quality.items())}
     return Track(
-        Source(str(found), numbered[0][0]),
+        RowSource(str(found), numbered[0][0]),
         time,
         values[:, :3] * [DEG, DEG, 1.0],
         above_sea="/geodetic" in header,

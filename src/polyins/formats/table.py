@@ -13,7 +13,7 @@ from polyins.errors import InputError
 from polyins.files import plain_suffix, write_bytes
 from polyins.formats.arrow_arrays import to_arrow
 from polyins.formats.columns import Column, column_names, read_columns
-from polyins.formats.rows import ImuRows, Source, Track, intervals
+from polyins.formats.rows import ImuRows, RowSource, Track, intervals
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG, STANDARD_GRAVITY
 
@@ -62,7 +62,7 @@ def imu_cells(columns: ImuColumns, rate_hz: float | None = None) -> list[Column]
     return [*columns.gyro.names, *columns.accel.names, *stamp]
 
 
-def imu_rows(source: Source, values: Sequence[Array], columns: ImuColumns, rate_hz: float | None = None) -> ImuRows:
+def imu_rows(source: RowSource, values: Sequence[Array], columns: ImuColumns, rate_hz: float | None = None) -> ImuRows:
     """Return the rows of an IMU table from the values of `imu_cells`, each of shape (T,)."""
     if rate_hz or columns.time is None:
         time = np.arange(len(values[0])) / (rate_hz or 1.0)
@@ -160,7 +160,7 @@ def write_imu(path: str | Path, stream: ImuStream) -> None:
 def write_gnss(path: str | Path, stream: GnssStream, *, geodetic: bool) -> None:
     """Write fixes with their standard deviations as CSV or Parquet, by the suffix."""
     track = Track(
-        Source(str(path)),
+        RowSource(str(path)),
         stream.time,
         stream.position,
         geodetic,
@@ -188,7 +188,7 @@ def write_track(path: str | Path, track: Track) -> None:
     _write(path, names, values)
 
 
-def _track(source: Source, time: Array, found: dict[str, Array], columns: TrackColumns) -> Track:
+def _track(source: RowSource, time: Array, found: dict[str, Array], columns: TrackColumns) -> Track:
     frame = columns.position.frame
     geodetic = frame == "latitude-longitude-height"
     vectors = columns.velocity.frame if columns.velocity else "north-east-down"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from polyins.errors import InputError
 from polyins.files import read_bytes
 from polyins.formats.columns import layout, read_columns
-from polyins.formats.rows import LONGEST_BRIDGE, ImuRows, Source, intervals, without
+from polyins.formats.rows import LONGEST_BRIDGE, ImuRows, RowSource, intervals, without
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -56,7 +56,7 @@ def read_imu(path: str | Path, rate_hz: float | None = None) -> ImuRows:
     warnings = []
     if len(values) and not values[0].any():
         warnings.append(f"{source.place(0)}: all values are zero; left out, the sensor begins with such a row")
-        source, time, values = Source(source.path, (source.first_line or 1) + 1), time[1:], values[1:]
+        source, time, values = RowSource(source.path, (source.first_line or 1) + 1), time[1:], values[1:]
     time, values = _late_rows_in_place(time, values)
     damaged = _damaged(values)
     bad = damaged[:, 0] | damaged[:, 3]
@@ -138,7 +138,7 @@ def _runs_longer(bad: Mask, length: int) -> Mask:
     return found
 
 
-def _report(source: Source, bad: Mask, lost: Mask) -> list[str]:
+def _report(source: RowSource, bad: Mask, lost: Mask) -> list[str]:
     if 2 * np.sum(bad) > len(bad):
         raise InputError(f"{source.path}: {np.sum(bad)} of {len(bad)} rows without valid Acc and Gyr; expected few")
     texts = []

@@ -16,7 +16,7 @@ from polyins.files import find
 from polyins.formats import table
 from polyins.formats.arrow_arrays import to_numpy
 from polyins.formats.columns import parquet_places
-from polyins.formats.rows import ImuRows, Source
+from polyins.formats.rows import ImuRows, RowSource
 from polyins.model.recording import USUAL_OF, Array, ImuStream, usual_interval
 from polyins.prepare.timesync import gaps_of
 from polyins.reading.imu_stream import in_array_axes
@@ -46,7 +46,7 @@ class ImuFile:
     def __init__(self, entry: ImuEntry) -> None:
         self.entry = entry
         self.columns = entry.columns or table.written_imu_columns()
-        self.source = Source(str(find(entry.file)))
+        self.source = RowSource(str(find(entry.file)))
         self.places = parquet_places(self.source.path, table.imu_cells(self.columns))
 
     def extent(self) -> Extent:

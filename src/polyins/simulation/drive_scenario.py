@@ -62,7 +62,7 @@ class Drive(Section):
         return drive(duration, static=static, seed=seed, start=start, driving=driving, world=world)
 
 
-class Replay(Section):
+class ReplayedDrive(Section):
     """Positions of a drive, as RTK gives them: speed, course and slope follow; the rest is said here."""
 
     FIELDS: ClassVar[Mapping[str, str]] = {

@@ -14,7 +14,7 @@ from polyins.config.units import in_si, read
 from polyins.model.rig import ImuErrors, NoiseGrade
 from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.shared_noise import SharedNoise
-from polyins.simulation.triads import Calibration, Chip
+from polyins.simulation.triads import Chip, TriadCalibration
 
 Array = NDArray[np.float64]
 
@@ -42,12 +42,12 @@ class ChipCalibration(Section):
     def chip(self) -> Chip:
         """Return the same in SI."""
         return Chip(
-            Calibration(np.array(self.gyro_matrix), in_si(self, "gyro_offset_deg_s")),
-            Calibration(np.array(self.accel_matrix), in_si(self, "accel_offset_m_s2")),
+            TriadCalibration(np.array(self.gyro_matrix), in_si(self, "gyro_offset_deg_s")),
+            TriadCalibration(np.array(self.accel_matrix), in_si(self, "accel_offset_m_s2")),
         )
 
 
-class Errors(Section):
+class SensorErrors(Section):
     """Which errors the IMUs have, beyond the statistics under `noise`."""
 
     FIELDS: ClassVar[Mapping[str, str]] = {

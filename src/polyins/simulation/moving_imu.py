@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.kernels.jit import kernel
-from polyins.simulation.flexible import Ruler, shape_of, tip_motion
+from polyins.simulation.flexible import FlexibleMount, shape_of, tip_motion
 from polyins.simulation.increments import rates
 from polyins.simulation.path import Path
 from polyins.simulation.shaking import Shaking
@@ -59,7 +59,7 @@ def smooth_rates(path: Path, count: int, interval: float) -> Array:
     return np.vstack(parts)
 
 
-def moving_increments(smooth: Array, ruler: Ruler, flexing: Array, shaking: Shaking) -> tuple[Array, Array]:
+def moving_increments(smooth: Array, ruler: FlexibleMount, flexing: Array, shaking: Shaking) -> tuple[Array, Array]:
     """Return (dtheta, dvel), shape (T, 3) each, of an IMU in its own axes.
 
     `smooth` is from `smooth_rates`, `flexing` from `flex`.

@@ -34,12 +34,12 @@ from polyins.model.recording import FilterOptions
 from polyins.model.rig import Imu, NoiseGrade, Rig
 from polyins.reading.imu_stream import initial_std
 from polyins.simulation import earth
-from polyins.simulation.drive_scenario import Drive, Replay
-from polyins.simulation.error_scenario import Errors as Errors
-from polyins.simulation.flexible_scenario import Road, Rulers, Shuttle
+from polyins.simulation.drive_scenario import Drive, ReplayedDrive
+from polyins.simulation.error_scenario import SensorErrors as SensorErrors
+from polyins.simulation.flexible_scenario import FlexibleMounts, Road, Shuttle
 from polyins.simulation.path import START, World
 from polyins.simulation.plane import Plane
-from polyins.simulation.wheel_scenario import Laps, Track, WheelModule
+from polyins.simulation.wheel_scenario import Laps, SurveyedTrack, WheelModule
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ class Board(Section):
         return axes_matrix(self.mounts[index % len(self.mounts)])
 
 
-class Lies(Section):
+class WrongFixes(Section):
     """Fixes that are wrong by much more than they claim, outside of outages, while driving."""
 
     count: Annotated[int, Field(ge=0, strict=True)] = 0
@@ -103,7 +103,7 @@ class Fixes(Section):
     """what the fixes claim, north, east, down, m; without it the white noise's"""
     velocity_std_m_s: Spread | None = None
     """of the velocity's noise, north, east, down, m/s; without it there are no velocities"""
-    lies: Lies = Lies()
+    lies: WrongFixes = WrongFixes()
     """wrong fixes"""
 
 
@@ -141,11 +141,11 @@ class Scenario(Section):
     """how it is driven, and over which roads, where no track or laps or replay or shuttle is given"""
     start_std: StartStd = StartStd()
     """of the start that the truth gives where there are wheels and no receiver"""
-    track: Track | None = None
+    track: SurveyedTrack | None = None
     """a surveyed track instead of a drive"""
     laps: Laps | None = None
     """laps of a rectangle instead of a drive; they are driven to their end unless duration_s is given"""
-    replay: Replay | None = None
+    replay: ReplayedDrive | None = None
     """a surveyed drive, driven again, instead of one of its own; its length and its standing start are its own"""
     shuttle: Shuttle | None = None
     """to and fro on straights instead of a drive"""
@@ -153,7 +153,7 @@ class Scenario(Section):
     """of the IMUs"""
     imus: Board = Board()
     """how many and where"""
-    rulers: Rulers | None = None
+    rulers: FlexibleMounts | None = None
     """flexible mounts instead of the board under imus"""
     road: Road | None = None
     """the ground that shakes the rulers; without it they are at rest"""
@@ -167,7 +167,7 @@ class Scenario(Section):
     """how far off they may be at the start, as `initial_std` of a configuration; the rest is as noise and errors say"""
     rolling: Rolling = Rolling()
     """how wheels aid the filter, as the configuration has it under filter.rolling"""
-    errors: Errors = Errors()
+    errors: SensorErrors = SensorErrors()
     """which errors they have"""
     gnss: Fixes | None = Fixes()
     """the receiver; null: none"""
@@ -271,7 +271,7 @@ class Scenario(Section):
         name = "body" if self.wheels else "imu"
         module = "body" if self.wheels and self.imus.pitch_m == 0.0 else ""
         if self.rulers:
-            imus = [Imu(f"imu{k}", grade, position=ruler.nominal) for k, ruler in enumerate(self.rulers.rulers(), 1)]
+            imus = [Imu(f"imu{k}", grade, position=ruler.nominal) for k, ruler in enumerate(self.rulers.mounts(), 1)]
         else:
             imus = [
                 Imu(f"{name}{index + 1}", grade, self.imus.rotation(index), position, module=module)
@@ -302,7 +302,7 @@ def demo() -> Scenario:
         name="demo",
         duration_s=360.0,
         static_s=40.0,
-        errors=Errors(turn_on_share=0.5, misalignment_deg=0.05),
+        errors=SensorErrors(turn_on_share=0.5, misalignment_deg=0.05),
         outages=OutageSchedule(length_s=30.0, every_s=75.0, first_after_s=60.0),
     )
 
