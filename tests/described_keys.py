@@ -16,5 +16,5 @@ def descriptions(model: type[BaseModel]) -> dict[str, str]:
             for key, text in zip(body.body, body.body[1:], strict=False):
                 if isinstance(key, ast.AnnAssign) and isinstance(text, ast.Expr):
                     assert isinstance(key.target, ast.Name)
-                    found[key.target.id] = inspect.cleandoc(ast.literal_eval(text.value))
+                    found[key.target.id] = " ".join(ast.literal_eval(text.value).split())  # one line: a row of a table
     return found

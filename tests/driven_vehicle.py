@@ -14,18 +14,18 @@ from polyins.model.recording import Recording
 from polyins.model.solution import Solution
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.run import record, true_run
-from polyins.simulation.scenario import Board, Errors, Fixes, Scenario
+from polyins.simulation.scenario import Board, Fixes, Scenario, SensorErrors
 from polyins.simulation.wheel_scenario import WheelModule
 
 Array = NDArray[np.float64]
 
 DEG = np.pi / 180.0
 ANTENNA = (0.2, 0.1, -0.8)
-PERFECT = Errors(noise=False, biases=False, scales=False)
+PERFECT = SensorErrors(noise=False, biases=False, scales=False)
 
 
 @lru_cache(maxsize=8)
-def drive(chips: int = 1, gnss: bool = False, errors: Errors = PERFECT, seed: int = 0) -> Recording:
+def drive(chips: int = 1, gnss: bool = False, errors: SensorErrors = PERFECT, seed: int = 0) -> Recording:
     """Two minutes of a small car on a plane, the first ten seconds standing."""
     sides = (("left", -0.4), ("right", 0.4))
     wheel_modules = tuple(

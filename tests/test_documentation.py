@@ -38,8 +38,8 @@ from polyins.config import columns
 from polyins.config.yaml_document import read_yaml
 from polyins.model.recording import GnssStream, ImuStream, Reference
 from polyins.simulation import error_scenario, flexible_scenario, scenario
-from polyins.simulation.drive_scenario import Drive, Replay
-from polyins.simulation.wheel_scenario import Laps, Slip, Track, WheelModule
+from polyins.simulation.drive_scenario import Drive, ReplayedDrive
+from polyins.simulation.wheel_scenario import Laps, Slip, SurveyedTrack, WheelModule
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PAGES = [REPOSITORY / "README.md", REPOSITORY / "CHANGELOG.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
@@ -436,7 +436,7 @@ CONFIGURATION: dict[str, type[BaseModel]] = {
     "columns.attitude": columns.AttitudeColumns,
     "columns.heading": columns.HeadingColumn,
     "columns.rows": columns.RowChoice,
-    "start": config.Start,
+    "start": config.StartEntry,
     "start.position": config.StartPosition,
     "outages": config.OutageSchedule,
     "filter": config.Filter,
@@ -447,20 +447,20 @@ SCENARIO: dict[str, type[BaseModel]] = {
     "the whole scenario": scenario.Scenario,
     "imus": scenario.Board,
     "shuttle": flexible_scenario.Shuttle,
-    "rulers": flexible_scenario.Rulers,
+    "rulers": flexible_scenario.FlexibleMounts,
     "rulers.arms": flexible_scenario.Arm,
     "road": flexible_scenario.Road,
     "road.books": flexible_scenario.Book,
-    "errors": error_scenario.Errors,
+    "errors": error_scenario.SensorErrors,
     "errors.chips": error_scenario.ChipCalibration,
     "gnss of a scenario": scenario.Fixes,
-    "gnss.lies": scenario.Lies,
+    "gnss.lies": scenario.WrongFixes,
     "wheels[]": WheelModule,
     "wheels[].slip": Slip,
-    "track": Track,
+    "track": SurveyedTrack,
     "laps": Laps,
     "drive": Drive,
-    "replay": Replay,
+    "replay": ReplayedDrive,
 }
 KINDS = (
     (config.Outages, "mapping or list of two numbers each"),

@@ -16,7 +16,7 @@ from polyins.model.recording import Recording
 from polyins.model.solution import Solution
 from polyins.navigate import batch, choice
 from polyins.prepare import course
-from polyins.simulation.scenario import Errors
+from polyins.simulation.scenario import SensorErrors
 
 
 @pytest.mark.parametrize("method", ["body-ins", "body-wheel-ins", "triple-ins", "multi-wheel-ins"])
@@ -58,7 +58,7 @@ def test_equal_chips_of_a_module_are_one(method: str) -> None:
 
 
 def test_chips_of_a_module_average_their_errors() -> None:
-    noisy = Errors(turn_on_share=1.0)
+    noisy = SensorErrors(turn_on_share=1.0)
     one, four = [], []
     for seed in range(4):
         recording = drive(chips=4, errors=noisy, seed=seed)

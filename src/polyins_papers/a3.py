@@ -16,7 +16,7 @@ import numpy as np
 
 from polyins.config import Positive, Section
 from polyins.model.recording import Recording
-from polyins.simulation.error_scenario import Errors
+from polyins.simulation.error_scenario import SensorErrors
 from polyins.simulation.run import TrueRun, true_run
 from polyins.studies import rigid_array
 from polyins.studies.chips import Chips, parts_of
@@ -67,7 +67,7 @@ Document = dict[str, Any]
 class Upper(Section):
     """What `upper.yaml` says."""
 
-    errors: Errors
+    errors: SensorErrors
     """those that are estimates"""
     standstill_late_s: Positive
     """by how much the standstill is taken too long, s"""
@@ -126,7 +126,7 @@ def reproduce(
     }
 
 
-def with_chips(run: TrueRun, errors: Errors, chips: Chips) -> TrueRun:
+def with_chips(run: TrueRun, errors: SensorErrors, chips: Chips) -> TrueRun:
     """Return the run with errors and the chips of a group."""
     return rigid_array.with_errors(run, errors.model_copy(update={"chips": chips}))
 
@@ -161,10 +161,10 @@ def largest_difference(rows: Mapping[str, Mapping[str, float]]) -> float:
 
 
 def add_sources(
-    run: TrueRun, errors: Errors, chips: Chips, seeds: Sequence[int], steps: Steps
+    run: TrueRun, errors: SensorErrors, chips: Chips, seeds: Sequence[int], steps: Steps
 ) -> dict[str, dict[str, float]]:
     """Return single, eNav-Fusion, their ratio and what of the ratio each source takes, added one after the other."""
-    known = rigid_array.with_errors(run, Errors(scales=errors.scales))
+    known = rigid_array.with_errors(run, SensorErrors(scales=errors.scales))
     exact = _with_fixes(known, position_std_m=EXACT_M, slow_std_m=NOTHING, stated_std_m=EXACT_M)
     result = {"white noise and drift": _pooled(partial(_recording_of_known_chips, exact), seeds, steps)}
     result["errors of the fixes"] = _pooled(partial(_recording_of_known_chips, known), seeds, steps)
@@ -182,7 +182,7 @@ def add_sources(
 
 
 def try_candidates(
-    run: TrueRun, errors: Errors, chips: Chips, seeds: Sequence[int], steps: Steps
+    run: TrueRun, errors: SensorErrors, chips: Chips, seeds: Sequence[int], steps: Steps
 ) -> dict[str, dict[str, float]]:
     """Return the same with one source larger, with a filter told too little, and with a start a little wrong."""
     own, upper = with_chips(run, errors, chips), UPPER.errors.model_dump()

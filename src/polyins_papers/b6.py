@@ -17,7 +17,7 @@ from polyins.formats.documents import plain
 from polyins.model.recording import Recording
 from polyins.navigate import batch
 from polyins.simulation.run import TrueRun, record
-from polyins.simulation.scenario import Errors
+from polyins.simulation.scenario import SensorErrors
 from polyins.studies.progress import Steps
 from polyins_papers.robot import (
     CONFIGURATIONS,
@@ -40,7 +40,7 @@ SEEDS = 5
 CAR_SEEDS = 3
 PREDICTIONS = {"window": "base, window", "end": "base"}
 """experiments, by what the wheel speed is compared with"""
-ERROR_FREE = Errors(noise=False, biases=False, scales=False)
+ERROR_FREE = SensorErrors(noise=False, biases=False, scales=False)
 ONE_SAMPLE_S = 0.005
 WHEELS, WITH_BODY = ("wheel-ins/left1", "wheel-ins/right1"), ("triple-ins/left1/right1/body1",)
 

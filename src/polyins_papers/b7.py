@@ -20,7 +20,7 @@ from polyins.model.attitude import euler_angles, euler_variance
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
-from polyins.simulation.scenario import Errors as ChipErrors
+from polyins.simulation.scenario import SensorErrors
 from polyins.studies.progress import Steps
 from polyins_papers.robot import WORKERS, Score, body_chip, figures, score, solve
 from polyins_papers.robot_experiments import Experiment, grade
@@ -60,7 +60,7 @@ TABLE = "Table III"
 BELIEVED = "as the filter believes"
 _BELIEVED = Experiment(
     "chips and start err by just the statistics that the filter is told",
-    errors=ChipErrors(),
+    errors=SensorErrors(),
     noise=FILTER_NOISE,
     predict="window",
 )
@@ -94,7 +94,7 @@ PAPER = {
 
 
 @dataclass(frozen=True)
-class Run:
+class ScoredRun:
     """One run of one filter."""
 
     score: Score
@@ -155,9 +155,9 @@ def case_recording(name: str, place: Site, seed: int) -> Recording:
 
 def run_both(
     recording: Recording, labels: Sequence[str] = LABELS, progress: Callable[[float], None] = lambda _: None
-) -> dict[str, list[Run]]:
+) -> dict[str, list[ScoredRun]]:
     """Run both filters over combinations, two at a time."""
-    runs: list[Run] = []
+    runs: list[ScoredRun] = []
     every = [label + ending for ending in FILTERS.values() for label in labels]
     with ThreadPoolExecutor(WORKERS) as pool:
         for run in pool.map(partial(_run, recording), every):
@@ -166,10 +166,10 @@ def run_both(
     return {name: runs[k * len(labels) : (k + 1) * len(labels)] for k, name in enumerate(FILTERS)}
 
 
-def _run(recording: Recording, label: str) -> Run:
+def _run(recording: Recording, label: str) -> ScoredRun:
     solution, errors = solve(recording, label)
     position, heading = honesty(solution, errors)
-    return Run(score(errors), float(position.mean()), float(heading.mean()))
+    return ScoredRun(score(errors), float(position.mean()), float(heading.mean()))
 
 
 def honesty(solution: Solution, errors: Errors) -> tuple[Array, Array]:
@@ -182,7 +182,7 @@ def honesty(solution: Solution, errors: Errors) -> tuple[Array, Array]:
     return position, errors.attitude[:, 2] ** 2 / heading_variance
 
 
-def _figures(seeds: Sequence[Mapping[str, list[Run]]]) -> dict[str, Any]:
+def _figures(seeds: Sequence[Mapping[str, list[ScoredRun]]]) -> dict[str, Any]:
     means = {name: _means([run for runs in seeds for run in runs[name]]) for name in FILTERS}
     by_seed = [{name: _means(runs[name]) for name in FILTERS} for runs in seeds]
     return {
@@ -199,7 +199,7 @@ def _lists(rows: list[dict[str, float]]) -> dict[str, list[float]]:
     return {key: [row[key] for row in rows] for key in rows[0]}
 
 
-def _means(runs: list[Run]) -> dict[str, float]:
+def _means(runs: list[ScoredRun]) -> dict[str, float]:
     return {
         "drift_mean_percent": float(np.mean([run.score.drift_percent for run in runs])),
         "heading_mean_deg": float(np.mean([run.score.heading_deg for run in runs])),

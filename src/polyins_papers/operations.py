@@ -177,9 +177,9 @@ def prepare(method: str, imus: int) -> Prepared:
     return batch.prepare(replace(recording, start=start, outages=()), method)
 
 
-def _mechanize(w: NDArray[Any], dt: Counted, near: NDArray[Any], strapdown: Any) -> None:
+def _mechanize(w: NDArray[Any], dt: Counted, around: NDArray[Any], strapdown: Any) -> None:
     strapdown.compensate(w, Counted(1.0), dt)
-    strapdown.mechanize(w, dt, Counted(1.0 / 12.0), near)
+    strapdown.mechanize(w, dt, Counted(1.0 / 12.0), around)
 
 
 def _fuse_measurements(rows: NDArray[Any], sums: NDArray[Any], block: NDArray[Any], dt: Counted, fuse: Any) -> None:

@@ -19,7 +19,7 @@ from polyins.model.rig import DEG, HOUR, Imu, Wheel
 from polyins.prepare.alignment import rotation_matrix
 from polyins.simulation import earth
 from polyins.simulation.run import TrueRun, record, true_run
-from polyins.simulation.scenario import Errors
+from polyins.simulation.scenario import SensorErrors
 from polyins.simulation.wheel_scenario import Slip
 from polyins.studies.scenario_files import read
 from polyins_papers.robot import WINDOW, as_in_the_paper
@@ -50,7 +50,7 @@ class Sizes(Section):
 
 SIZES = read(Sizes, __package__, "experiments")
 CONSTANT = ROBOT.base.errors
-WANDERING = Errors(turn_on_share=1.0 - (SIZES.wandering_bias_deg_h / CHIPS.gyro_bias_deg_h[0]) ** 2)
+WANDERING = SensorErrors(turn_on_share=1.0 - (SIZES.wandering_bias_deg_h / CHIPS.gyro_bias_deg_h[0]) ** 2)
 WANDERING_TIME_H = SIZES.wandering_time_s / HOUR
 FIELD_SEEDS = 3
 
@@ -62,7 +62,7 @@ class Experiment:
     source: str
     """what differs, and where its size is from"""
     world: World = "plane"
-    errors: Errors = CONSTANT
+    errors: SensorErrors = CONSTANT
     noise: Noise = CHIPS
     """of the chips"""
     filter_noise: Noise = FILTER_NOISE
@@ -81,7 +81,7 @@ class Experiment:
 
 
 @lru_cache(maxsize=1)
-def _drawn(site: Site, world: World, errors: Errors, noise: Noise, filter_noise: Noise, seed: int) -> Recording:
+def _drawn(site: Site, world: World, errors: SensorErrors, noise: Noise, filter_noise: Noise, seed: int) -> Recording:
     run = truth(site, world)
     scenario = run.scenario.model_copy(update={"errors": errors, "noise": noise, "filter_noise": filter_noise})
     return record(replace(run, scenario=scenario), seed=seed).recording

@@ -22,7 +22,7 @@ from polyins_papers.vehicles import ROBOT
 
 
 @dataclass(frozen=True)
-class Curves:
+class SubsystemFigure:
     """What a figure draws."""
 
     runs: Mapping[str, str]
@@ -32,7 +32,7 @@ class Curves:
 
 
 FIGURES = {
-    "bfig7": Curves(
+    "bfig7": SubsystemFigure(
         {
             "Dual Wheel-INS": "dual-wheel-ins/left1/right4",
             "Left Wheel-INS": "wheel-ins/left1",
@@ -44,7 +44,7 @@ FIGURES = {
             "Right Wheel-INS": (1.00, 2.28),
         },
     ),
-    "bfig8": Curves(
+    "bfig8": SubsystemFigure(
         {
             "Body/Wheel-INS": "body-wheel-ins/left2/body2",
             "Left Wheel-INS": "wheel-ins/left2",
@@ -55,7 +55,7 @@ FIGURES = {
             "Left Wheel-INS": (1.34, 3.82),
         },
     ),
-    "bfig9": Curves(
+    "bfig9": SubsystemFigure(
         {
             "Triple INS": "triple-ins/left1/right2/body4",
             "Left Wheel-INS": "wheel-ins/left1",

@@ -8,8 +8,8 @@ from pathlib import Path as FilePath
 from typing import Any, Literal
 
 from polyins.config import Noise
-from polyins.simulation.scenario import Errors, Scenario
-from polyins.simulation.wheel_scenario import Laps, Slip, Track
+from polyins.simulation.scenario import Scenario, SensorErrors
+from polyins.simulation.wheel_scenario import Laps, Slip, SurveyedTrack
 from polyins.studies.scenario_files import read, scenarios
 
 Earth = Literal["turning", "plane"]
@@ -34,7 +34,7 @@ class Vehicle:
         """What stands in for its track."""
         return scenarios(__package__, "laps")[self.name].laps
 
-    def _track(self, folder: FilePath) -> Track:
+    def _track(self, folder: FilePath) -> SurveyedTrack:
         track = self.base.track
         assert track is not None
         return track.model_copy(update={key: str(folder / getattr(track, key)) for key in ("file", "odometer")})
@@ -46,7 +46,7 @@ class Vehicle:
         level: bool = False,
         earth: Earth | None = None,
         noise: Noise | None = None,
-        errors: Errors | None = None,
+        errors: SensorErrors | None = None,
         slip: Slip | None = None,
         duration_s: float | None = None,
     ) -> Scenario:

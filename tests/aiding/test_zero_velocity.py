@@ -12,7 +12,7 @@ from driven_vehicle import drive, with_rolling
 import polyins as pi
 from polyins.aiding import kinds
 from polyins.navigate import batch, update
-from polyins.simulation.scenario import Errors
+from polyins.simulation.scenario import SensorErrors
 
 EVENT = np.array([kinds.ZERO_VELOCITY, 1.0])
 
@@ -42,7 +42,7 @@ def test_driving_straight_on_is_no_standstill() -> None:
 
 
 def test_at_a_stop_the_gyros_are_calibrated() -> None:
-    recording = drive(errors=Errors(noise=True, biases=True, scales=False, turn_on_share=1.0))
+    recording = drive(errors=SensorErrors(noise=True, biases=True, scales=False, turn_on_share=1.0))
     # the bias is not taken from the standstill, which is still ahead of the start
     start = replace(recording.start, time=1.0, static_interval=(0.0, 1.0), estimate_gyro_bias=False)
     recording = replace(recording, start=start)

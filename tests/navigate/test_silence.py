@@ -13,7 +13,7 @@ import polyins as pi
 from polyins.kernels import bank
 from polyins.kernels.bank import LANES
 from polyins.navigate import batch
-from polyins.simulation.scenario import Errors
+from polyins.simulation.scenario import SensorErrors
 
 
 @pytest.mark.parametrize("method", ["dual-wheel-ins", "triple-ins", "triple-ins/centralized"])
@@ -34,7 +34,7 @@ def test_a_silent_wheel_is_carried_along(method: str) -> None:
 
 @pytest.mark.parametrize("method", ["wheel-ins/left", "body-ins/left", "triple-ins"])
 def test_one_silent_chip_does_not_silence_its_module(method: str) -> None:
-    whole = drive(chips=3, errors=Errors(noise=False, scales=False))
+    whole = drive(chips=3, errors=SensorErrors(noise=False, scales=False))
     solution, undisturbed = (pi.run(one, method) for one in (without(whole, "left2", 50.0, 90.0), whole))
     assert re.fullmatch(r"IMU left2: silent for 40.0\d s from 50.00 s; its module went on without it", *solution.faults)
     # the mean of two that err otherwise than the mean of three, by a bias known from the standstill

@@ -140,7 +140,7 @@ def test_what_is_swept_is_all_that_changes() -> None:
     stiff = nonrigid.with_thickness(lawn, 2.0)
     assert stiff.rulers is not None
     # of the ruler alone; the module's mass at its tip makes it more
-    assert stiff.rulers.rulers()[0].bending_rate > 2.0 * lawn.rulers.rulers()[0].bending_rate
+    assert stiff.rulers.mounts()[0].bending_rate > 2.0 * lawn.rulers.mounts()[0].bending_rate
     assert nonrigid.with_thickness(stiff, 1.0) == lawn
     for variant in a5.VARIANTS.values():
         for test in variant.tests:
@@ -182,7 +182,7 @@ def ringing(periods: float) -> Array:
     assert scenario.rulers is not None
     assert scenario.road is not None
     assert scenario.shuttle is not None
-    rulers, speed, at, static = scenario.rulers.rulers(), scenario.shuttle.speed_m_s, 4.0, 1.0
+    rulers, speed, at, static = scenario.rulers.mounts(), scenario.shuttle.speed_m_s, 4.0, 1.0
     length = periods * speed * 2.0 * np.pi / rulers[0].bending_rate
     assert length == pytest.approx(0.21, abs=0.002) or periods != 2.0
     book = Book(at_m=at, height_m=0.01, length_m=length, under="left")

@@ -14,7 +14,7 @@ from polyins.model.recording import Reference
 from polyins.navigate.choice import choose
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.run import record, true_run
-from polyins.simulation.scenario import Board, Errors, Scenario
+from polyins.simulation.scenario import Board, Scenario, SensorErrors
 from polyins_papers import b6, b7, robot_experiments
 from polyins_papers.robot import CONFIGURATIONS, FEW, Score, as_in_the_paper, at_the_reference, by_seed, score, table
 from polyins_papers.sites import site
@@ -35,7 +35,7 @@ def short():
         wheels=robot.wheels,
         noise=robot.noise,
         filter_noise=robot.filter_noise,
-        errors=Errors(turn_on_share=1.0),
+        errors=SensorErrors(turn_on_share=1.0),
         gnss=None,
     )
     return record(true_run(scenario), seed=0).recording

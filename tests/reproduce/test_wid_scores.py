@@ -12,7 +12,7 @@ from polyins.model.recording import ImuStream, Recording, Reference
 from polyins.model.rig import Imu, Rig
 from polyins.studies import wid
 from polyins.studies.reproduction import print_document
-from polyins.studies.wid import Track, Trial
+from polyins.studies.wid import ReferenceAtFixes, Trial
 
 EAST = np.radians(90.0)
 ANTENNA = np.array([2.0, -1.0, 0.0])
@@ -24,7 +24,7 @@ def trial(**changes: object) -> Trial:
     """East at 5 m/s for 300 m, after and before ten seconds at rest."""
     time = np.arange(0.0, 80.1, 0.2)
     distance = SPEED * np.clip(time - 10.0, 0.0, 60.0)
-    track = Track(
+    track = ReferenceAtFixes(
         time=time,
         north_east=np.column_stack([np.ones_like(time), 2.0 + distance]),
         usable=np.ones(time.shape, dtype=bool),

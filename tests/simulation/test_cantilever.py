@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from polyins.simulation.cantilever import Cantilever
-from polyins.simulation.flexible import Ruler, flex
+from polyins.simulation.flexible import FlexibleMount, flex
 from polyins.simulation.shaking import Shaking
 
 STEP = 1.0 / 2000.0
@@ -57,7 +57,7 @@ def jolted(damping):
     rise = np.gradient(heave, STEP)
     none = np.zeros_like(heave)
     shaking = Shaking(STEP, np.column_stack([heave, none, none]), np.column_stack([rise, none, none]))
-    flexing = flex(Ruler(beam(), np.array([0.0, 0.3, 0.0]), 1.0, damping=damping), shaking, 0.0)
+    flexing = flex(FlexibleMount(beam(), np.array([0.0, 0.3, 0.0]), 1.0, damping=damping), shaking, 0.0)
     after = slice(100, None)
     return flexing[after, 0], flexing[after, 2]
 
@@ -93,7 +93,7 @@ def test_a_clamp_that_moves_slowly_bends_the_ruler_by_its_inertia():
     roll, rolling = swing * (1.0 - np.cos(time)), swing * np.sin(time)
     none = np.zeros_like(time)
     shaking = Shaking(STEP, np.column_stack([none, none, roll]), np.column_stack([none, none, rolling]))
-    ruler = Ruler(beam(HEAVY), np.array([0.0, place, 0.0]), 1.0, damping=0.5)
+    ruler = FlexibleMount(beam(HEAVY), np.array([0.0, place, 0.0]), 1.0, damping=0.5)
     d = flex(ruler, shaking, 0.0)[10000:, 0]
     # the heavy tip at the ruler's end takes force to be turned about the middle
     force = -HEAVY * place * swing * np.cos(time[10000:])

@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from polyins.errors import InputError
 from polyins.model.rig import DEG, HOUR, NoiseGrade
-from polyins.simulation.error_scenario import ChipCalibration, Errors
+from polyins.simulation.error_scenario import ChipCalibration, SensorErrors
 from polyins.simulation.imu_errors import Imperfections, corrupt, draw_errors
 from polyins.simulation.run import simulate
 from polyins.simulation.sampling import jittered, rounded
 from polyins.simulation.scenario import Board, Scenario
 from polyins.simulation.shared_noise import SharedNoise
-from polyins.simulation.triads import Calibration, skewed
+from polyins.simulation.triads import TriadCalibration, skewed
 
 GRADE = NoiseGrade.from_datasheet(
     angle_random_walk_deg_sqrt_h=0.24,
@@ -87,7 +87,7 @@ def test_random_walk_grows_with_the_root_of_time():
     for at in (100, 400):
         np.testing.assert_allclose(drawn[:, at, :3].std() / np.sqrt(at), 2e-6, rtol=0.06)
         np.testing.assert_allclose(drawn[:, at, 3:].std() / np.sqrt(at), 3e-4, rtol=0.06)
-    assert Errors(gyro_random_walk_deg_h_sqrt_h=3.0).imperfections().gyro_random_walk == pytest.approx(
+    assert SensorErrors(gyro_random_walk_deg_h_sqrt_h=3.0).imperfections().gyro_random_walk == pytest.approx(
         3.0 * DEG / HOUR / np.sqrt(HOUR)
     )
 
@@ -111,7 +111,7 @@ def test_skew_leaves_x_and_leans_the_others():
 
 def test_a_chip_s_calibration_takes_off_what_it_put_on():
     matrix = np.eye(3) + RNG.normal(0.0, 0.01, (3, 3))
-    calibration = Calibration(matrix, np.array([0.01, -0.02, 0.03]))
+    calibration = TriadCalibration(matrix, np.array([0.01, -0.02, 0.03]))
     plain, odd = ChipCalibration().chip(), replace(ChipCalibration().chip(), gyro=calibration, accel=calibration)
     _, dtheta, dvel = measured(replace(NOTHING, chips=(plain, odd)), number=3)
     for raw, true in ((dtheta, DTHETA), (dvel, DVEL)):
@@ -140,8 +140,8 @@ def test_vibration_is_rectified():
     _, _, shaken = measured(replace(NOTHING, rectification_mean=1e-3))
     added = (shaken - DVEL) / INTERVAL
     np.testing.assert_allclose(added, 1e-3 * ((DVEL / INTERVAL) ** 2 - (DVEL[0] / INTERVAL) ** 2), atol=1e-14)
-    assert Errors(vibration_m_s2=0.5).vibration(np.array([20.0]))[0] == pytest.approx(1.0)
-    assert Errors(rectification_mg_g2=1.0).imperfections().rectification_mean == pytest.approx(1e-3 / 9.80665)
+    assert SensorErrors(vibration_m_s2=0.5).vibration(np.array([20.0]))[0] == pytest.approx(1.0)
+    assert SensorErrors(rectification_mg_g2=1.0).imperfections().rectification_mean == pytest.approx(1e-3 / 9.80665)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
@@ -196,9 +196,9 @@ def test_jitter_shows_the_rate_of_another_instant():
 def test_scenarios_switch_errors_on_one_by_one():
     short = Scenario(duration_s=20.0, static_s=5.0, rate_hz=50.0, imus=Board(count=2), outages=())
     plain = simulate(short)
-    same = simulate(short.model_copy(update={"errors": Errors(vibration_m_s2=1.0)}))
+    same = simulate(short.model_copy(update={"errors": SensorErrors(vibration_m_s2=1.0)}))
     np.testing.assert_array_equal(plain.imus[1].dvel, same.imus[1].dvel)
-    walked = simulate(short.model_copy(update={"errors": Errors(gyro_turn_on_deg_h=100.0)}))
+    walked = simulate(short.model_copy(update={"errors": SensorErrors(gyro_turn_on_deg_h=100.0)}))
     offset = walked.imus[1].dtheta - plain.imus[1].dtheta
     np.testing.assert_allclose(offset, np.tile(offset[0], (len(offset), 1)), atol=1e-15)
     assert walked.rig.imus[1].start_std()[0] == pytest.approx(np.hypot(100.0, 50.0) * DEG / HOUR)
@@ -207,4 +207,4 @@ def test_scenarios_switch_errors_on_one_by_one():
 
 def test_jitter_beyond_a_tenth_of_the_interval_is_refused():
     with pytest.raises((InputError, ValueError), match=r"errors.jitter_s is 0.001; expected at most a tenth"):
-        Scenario(errors=Errors(jitter_s=1e-3))
+        Scenario(errors=SensorErrors(jitter_s=1e-3))

@@ -7,16 +7,16 @@ from scipy.spatial.transform import Rotation
 
 from polyins.simulation import earth
 from polyins.simulation.cantilever import Cantilever
-from polyins.simulation.flexible import Ruler, flex, shape_of, tip_motion
-from polyins.simulation.flexible_scenario import Book, Road, Rulers, Shuttle
+from polyins.simulation.flexible import FlexibleMount, flex, shape_of, tip_motion
+from polyins.simulation.flexible_scenario import Book, FlexibleMounts, Road, Shuttle
 from polyins.simulation.increments import increments
 from polyins.simulation.moving_imu import moving_increments, smooth_rates
 from polyins.simulation.shaking import Shaking, shake, shaken_path
 
 STEP = 1.0 / 2000.0
 BEAM = Cantilever(0.22, 0.03, 0.001, 0.015, 0.008, 0.02)
-RIGHT = Ruler(BEAM, np.array([-0.2, 0.31, 0.01]), 1.0, tuning=1.02)
-LEFT = Ruler(BEAM, np.array([0.18, -0.28, 0.01]), -1.0, tuning=0.98)
+RIGHT = FlexibleMount(BEAM, np.array([-0.2, 0.31, 0.01]), 1.0, tuning=1.02)
+LEFT = FlexibleMount(BEAM, np.array([0.18, -0.28, 0.01]), -1.0, tuning=0.98)
 
 
 def shuttle(duration=40.0):
@@ -85,7 +85,7 @@ def test_rates_and_forces_are_derivatives_of_the_pose():
 def test_a_stiff_ruler_on_level_ground_is_a_rigid_mount():
     path = shuttle(20.0)
     still = Shaking(STEP, np.zeros((40001, 3)), np.zeros((40001, 3)))
-    stiff = Ruler(BEAM, RIGHT.tip, 1.0, stiff=True)
+    stiff = FlexibleMount(BEAM, RIGHT.tip, 1.0, stiff=True)
     dtheta, dvel = moving_increments(smooth_rates(path, 4000, 0.005), stiff, flex(stiff, still, 9.79), still)
     rigid_dtheta, rigid_dvel = increments(path).at(stiff.nominal)
     np.testing.assert_allclose(dtheta, rigid_dtheta, atol=1e-10)
@@ -94,7 +94,7 @@ def test_a_stiff_ruler_on_level_ground_is_a_rigid_mount():
 
 def test_at_rest_a_ruler_sags_by_its_own_weight_and_the_module_s():
     still = Shaking(STEP, np.zeros((10, 3)), np.zeros((10, 3)))
-    ruler = Ruler(BEAM, RIGHT.tip, 1.0)
+    ruler = FlexibleMount(BEAM, RIGHT.tip, 1.0)
     sag = flex(ruler, still, 9.81)[:, 0]
     rigidity = 200e9 * 0.03 * 0.001**3 / 12.0
     weight = 7850.0 * 0.03 * 0.001 * 9.81
@@ -103,7 +103,7 @@ def test_at_rest_a_ruler_sags_by_its_own_weight_and_the_module_s():
     np.testing.assert_allclose(sag, expected, rtol=0.01)
     # gravity's direction as the module feels it: turned by the slope, the right way on either side
     for side, tip in ((1.0, 0.3), (-1.0, -0.3)):
-        turned = moved(Ruler(BEAM, np.array([0.0, tip, 0.0]), side), flex(ruler, still, 9.81), still, 0)[0]
+        turned = moved(FlexibleMount(BEAM, np.array([0.0, tip, 0.0]), side), flex(ruler, still, 9.81), still, 0)[0]
         assert Rotation.from_matrix(turned).as_euler("ZYX")[2] == pytest.approx(side * BEAM.slope * sag[0] / 0.22)
 
 
@@ -128,7 +128,7 @@ def test_what_a_clamp_gives_to_one_end_of_a_ruler_it_takes_from_the_other():
     arms = [{"tip_m": (x, y, 0.0), "free_length_m": 0.2} for x in (0.1, -0.1) for y in (0.3, -0.3)]
     found = set()
     for seed in range(20):
-        tunings = [ruler.tuning for ruler in Rulers(arms=tuple(arms)).rulers(np.random.default_rng(seed))]
+        tunings = [ruler.tuning for ruler in FlexibleMounts(arms=tuple(arms)).mounts(np.random.default_rng(seed))]
         np.testing.assert_allclose([tunings[0] + tunings[1], tunings[2] + tunings[3]], 2.0)
         found.add(tuple(np.round(tunings, 6)))
     # either end may be the longer one, of each ruler
@@ -137,6 +137,6 @@ def test_what_a_clamp_gives_to_one_end_of_a_ruler_it_takes_from_the_other():
 
 def test_each_imu_keeps_its_nominal_place_in_the_rig():
     arms = ({"tip_m": (0.1, 0.3, 0.0), "free_length_m": 0.2}, {"tip_m": (0.1, -0.3, 0.0), "free_length_m": 0.2})
-    right, left = Rulers(arms=arms).rulers()
+    right, left = FlexibleMounts(arms=arms).mounts()
     np.testing.assert_allclose(right.nominal, [0.1, 0.3, -0.008])
     assert (right.side, left.side) == (1.0, -1.0)

@@ -6,7 +6,7 @@ import pytest
 from polyins.errors import InputError
 from polyins.simulation import flexible_scenario
 from polyins.simulation.drive_scenario import Drive
-from polyins.simulation.error_scenario import Errors
+from polyins.simulation.error_scenario import SensorErrors
 from polyins.simulation.road import ground
 from polyins.simulation.run import record, simulate, true_run
 from polyins.simulation.scenario import read_scenario
@@ -82,7 +82,7 @@ def test_the_configuration_in_force_reads_back(test, tmp_path):
 
 
 def test_perfect_imus_read_what_their_tips_feel():
-    perfect = SHORT.model_copy(update={"errors": Errors(noise=False, biases=False, scales=False)})
+    perfect = SHORT.model_copy(update={"errors": SensorErrors(noise=False, biases=False, scales=False)})
     run = true_run(perfect)
     recording = record(run, seed=0).recording
     for imu, stream in zip(recording.rig.imus, recording.imus, strict=True):

@@ -3,7 +3,7 @@ from curves import Line
 from pymap3d import geodetic2ned
 
 from polyins.model.attitude import quaternions, rotation_matrices
-from polyins.simulation.gnss import fixes, with_lies
+from polyins.simulation.gnss import fixes, with_wrong_fixes
 from polyins.simulation.increments import increments
 from polyins.simulation.path import drive, path
 from polyins.simulation.plane import Plane
@@ -54,7 +54,7 @@ def test_fixes_and_lies_are_in_metres():
     stream = fixes(drawn, ORIGIN, rng=np.random.default_rng(0), position_std=1.0)
     off = stream.position - drawn.truth(stream.time).position
     assert 0.8 < off.std() < 1.2
-    lying, chosen = with_lies(stream, np.arange(50, 90), 5, 30.0, np.random.default_rng(1), drawn.world)
+    lying, chosen = with_wrong_fixes(stream, np.arange(50, 90), 5, 30.0, np.random.default_rng(1), drawn.world)
     moved = np.linalg.norm(lying.position - stream.position, axis=1)
     np.testing.assert_allclose(moved[chosen], 30.0, rtol=1e-12)
     assert np.count_nonzero(moved) == 5

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from polyins.errors import InputError
 from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG
-from polyins.simulation.drive_scenario import Drive, Replay
+from polyins.simulation.drive_scenario import Drive, ReplayedDrive
 from polyins.simulation.path import Driving, Path, drive
 from polyins.simulation.replay import HELD_BELOW, Ride, replay
 from polyins.simulation.run import simulate, true_run
@@ -244,13 +244,13 @@ def test_the_file_of_a_receiver_is_driven_again_as_sure_as_it_says(
     time, position, std = fixes
     np.savetxt(tmp_path / "rtk.txt", np.column_stack([time, position[:, :2] / DEG, position[:, 2], std]), fmt="%.12f")
     seconds = np.linspace(0.0, 200.0, 50)
-    path = Replay(file=str(tmp_path / "rtk.txt")).path(3)
+    path = ReplayedDrive(file=str(tmp_path / "rtk.txt")).path(3)
     np.testing.assert_allclose(path.roll(seconds), replay(*fixes, seed=3).roll(seconds), atol=1e-6)
     # told that they are worse it follows them less
-    loose = Replay(file=str(tmp_path / "rtk.txt"), position_std_m=(2.0, 2.0, 2.0)).path(3)
+    loose = ReplayedDrive(file=str(tmp_path / "rtk.txt"), position_std_m=(2.0, 2.0, 2.0)).path(3)
     assert np.abs(path.speed(seconds) - loose.speed(seconds)).max() > 0.1
     # a part of it begins where the survey is then
-    later = Replay(file=str(tmp_path / "rtk.txt"), from_s=1060.0, to_s=1230.0).path(3)
+    later = ReplayedDrive(file=str(tmp_path / "rtk.txt"), from_s=1060.0, to_s=1230.0).path(3)
     assert later.duration == pytest.approx(170.0)
     np.testing.assert_allclose(later.position(np.zeros(1))[0], position[60], atol=1e-9)
     np.testing.assert_allclose(later.speed(seconds[:40]), path.speed(seconds[:40] + 60.0), atol=0.3)
@@ -260,16 +260,16 @@ def test_the_road_and_the_springs_are_as_the_scenario_says(
     tmp_path: FilePath, fixes: tuple[Array, Array, Array]
 ) -> None:
     file = str(replay_file(tmp_path, fixes).with_name("rtk.csv"))
-    stiff = Replay(file=file, camber_deg=0.0, roll_deg_per_m_s2=0.0, pitch_deg_per_m_s2=0.0).path(0)
+    stiff = ReplayedDrive(file=file, camber_deg=0.0, roll_deg_per_m_s2=0.0, pitch_deg_per_m_s2=0.0).path(0)
     time = np.arange(35.0, 239.0, 0.1)
     assert not stiff.roll(time).any()
     across = stiff.speed(time) * stiff.heading(time, 1)
-    leaning = Replay(file=file, camber_deg=0.0, roll_deg_per_m_s2=1.0, pitch_deg_per_m_s2=0.0).path(0)
+    leaning = ReplayedDrive(file=file, camber_deg=0.0, roll_deg_per_m_s2=1.0, pitch_deg_per_m_s2=0.0).path(0)
     assert np.polyfit(across, leaning.roll(time), 1)[0] == pytest.approx(-1.0 * DEG, rel=0.1)
-    diving = Replay(file=file, camber_deg=0.0, roll_deg_per_m_s2=0.0, pitch_deg_per_m_s2=1.0).path(0)
+    diving = ReplayedDrive(file=file, camber_deg=0.0, roll_deg_per_m_s2=0.0, pitch_deg_per_m_s2=1.0).path(0)
     along = stiff.speed(time, 1)
     assert np.polyfit(along, diving.pitch(time) - stiff.pitch(time), 1)[0] == pytest.approx(1.0 * DEG, rel=0.1)
-    cambered = Replay(file=file, camber_deg=2.0, camber_length_m=20.0, roll_deg_per_m_s2=0.0).path(0)
+    cambered = ReplayedDrive(file=file, camber_deg=2.0, camber_length_m=20.0, roll_deg_per_m_s2=0.0).path(0)
     assert np.std(cambered.roll(time)) == pytest.approx(2.0 * DEG * np.sqrt(2.0 / 3.0), rel=0.35)
 
 
@@ -281,7 +281,7 @@ def test_what_a_scenario_does_not_say_of_a_road_is_as_elsewhere() -> None:
         ]  # type: ignore[call-overload]
 
     assert of(Driving()) == pytest.approx(list(Drive().model_dump().values()))
-    said = Replay(file="").model_dump(exclude={"file", "from_s", "to_s", "position_std_m"})
+    said = ReplayedDrive(file="").model_dump(exclude={"file", "from_s", "to_s", "position_std_m"})
     assert of(Ride()) == pytest.approx(list(said.values()))
 
 
@@ -302,20 +302,22 @@ def test_doubts_about_a_survey_reach_the_recording(tmp_path: FilePath, fixes: tu
 def test_a_part_that_is_not_there(tmp_path: FilePath, fixes: tuple[Array, Array, Array]) -> None:
     file = str(replay_file(tmp_path, fixes).with_name("rtk.csv"))
     with pytest.raises(InputError, match=r"from_s and to_s leave no positions; .*rtk\.csv covers 1000 to 1240 s"):
-        Replay(file=file, from_s=10.0, to_s=20.0).path(0)
-    (warning,) = Replay(file=file, from_s=10.0).path(0).warnings
+        ReplayedDrive(file=file, from_s=10.0, to_s=20.0).path(0)
+    (warning,) = ReplayedDrive(file=file, from_s=10.0).path(0).warnings
     assert "outside of what there is" in warning
-    assert Replay(file=file, from_s=1000.0, to_s=1240.0).path(0).warnings == ()
+    assert ReplayedDrive(file=file, from_s=1000.0, to_s=1240.0).path(0).warnings == ()
     (tmp_path / "scenario.yaml").write_text("replay: {file: rtk.csv, from_s: 9, to_s: 5}")
     with pytest.raises(InputError, match=r"line 1: replay\.to_s: is 5; expected more than the 9 of from_s"):
         read_scenario(tmp_path / "scenario.yaml")
     # what is wrong elsewhere in the file does not matter
     lines = (tmp_path / "rtk.csv").read_text().splitlines()
     (tmp_path / "rtk.csv").write_text("\n".join([*lines[:5], "1004,,114.0,35.0", *lines[6:]]))
-    assert Replay(file=file, from_s=1010.0).path(0).duration == pytest.approx(230.0)
+    assert ReplayedDrive(file=file, from_s=1010.0).path(0).duration == pytest.approx(230.0)
 
 
 def test_heights_may_be_taken_as_they_are(tmp_path: FilePath, fixes: tuple[Array, Array, Array]) -> None:
     file = str(replay_file(tmp_path, fixes).with_name("rtk.csv"))
-    rough, smooth = (Replay(file=file, slope_smoothing_m=way).path(0).pitch(np.arange(35.0, 239.0)) for way in (0, 10))
+    rough, smooth = (
+        ReplayedDrive(file=file, slope_smoothing_m=way).path(0).pitch(np.arange(35.0, 239.0)) for way in (0, 10)
+    )
     assert np.std(np.diff(rough)) > np.std(np.diff(smooth))

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from polyins.simulation.road import FINE, STEP, Bump, Roughness, Wheel, ground
+from polyins.simulation.road import FINE, STEP, Bump, Roughness, WheelContact, ground
 from polyins.simulation.shuttle import Way, shuttle_path
 from polyins.simulation.transmission import transmit
 
-POINT, WHEEL = Wheel(0.0, 0.0), Wheel(0.125, 0.08)
+POINT, WHEEL = WheelContact(0.0, 0.0), WheelContact(0.125, 0.08)
 FLAT = Roughness(0.0, 0.1, 3.0, 0.5, 4.0, 0.4)
 
 
@@ -57,7 +57,7 @@ def test_a_book_lifts_the_wheels_of_its_side_only():
 def test_a_round_wheel_rolls_over_an_edge_along_an_arc():
     # between two points of the profile, which are its first and its last
     book = Bump(5.001, 0.2, 0.015, left=True, right=True)
-    drawn = ground(10.0, FLAT, (book,), Wheel(0.125, 0.0), np.random.default_rng(0))
+    drawn = ground(10.0, FLAT, (book,), WheelContact(0.125, 0.0), np.random.default_rng(0))
     before = FINE * np.arange(4, 40)
     # the disc touches the edge; its axle is on a circle about it
     arc = 0.015 - 0.125 + np.sqrt(np.maximum(0.125**2 - before**2, 0.0))

@@ -9,11 +9,11 @@ from polyins.errors import InputError
 from polyins.model.geodesy import metres_per_unit
 from polyins.simulation.increments import increments
 from polyins.simulation.run import simulate, simulate_with_truth
-from polyins.simulation.scenario import Board, Errors, Fixes, Lies, Scenario, demo, read_scenario
+from polyins.simulation.scenario import Board, Fixes, Scenario, SensorErrors, WrongFixes, demo, read_scenario
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SHORT = Scenario(duration_s=60.0, static_s=10.0, rate_hz=50.0, imus=Board(count=3), outages=((30.0, 40.0),))
-PERFECT = Errors(noise=False, biases=False, scales=False)
+PERFECT = SensorErrors(noise=False, biases=False, scales=False)
 MOUNTS = (("x", "y", "z"), ("x", "-y", "-z"), ("y", "z", "x"))
 
 
@@ -54,7 +54,7 @@ def test_perfect_imus_read_the_exact_increments_in_array_axes():
 
 
 def test_drawn_errors_explain_the_streams():
-    errors = Errors(noise=False, turn_on_share=0.5)
+    errors = SensorErrors(noise=False, turn_on_share=0.5)
     simulation = simulate_with_truth(changed(errors=errors, imus=Board(count=3, mounts=MOUNTS)))
     exact = increments(simulation.path, 50.0)
     for imu, stream, drawn in zip(
@@ -91,13 +91,13 @@ def test_a_negative_seed_is_refused():
 
 
 def test_lies_are_told_where_the_filter_sees_them():
-    lying = Fixes(rate_hz=5.0, lies=Lies(count=20, size_m=40.0))
+    lying = Fixes(rate_hz=5.0, lies=WrongFixes(count=20, size_m=40.0))
     simulation = simulate_with_truth(changed(gnss=lying))
     fix = simulation.recording.gnss
     truth = simulation.path.truth(fix.time, lying.antenna_position_m)
     wrong = np.abs(fix.position - truth.position)[:, :2].max(axis=1) * 6.4e6 > 10.0
-    np.testing.assert_array_equal(np.flatnonzero(wrong), simulation.lies)
-    told = fix.time[simulation.lies]
+    np.testing.assert_array_equal(np.flatnonzero(wrong), simulation.wrong_fixes)
+    told = fix.time[simulation.wrong_fixes]
     assert told.size == 20
     assert told.min() > 10.0
     assert not np.any((told >= 30.0) & (told <= 40.0))

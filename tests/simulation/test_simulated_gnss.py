@@ -3,7 +3,7 @@ import pytest
 from pymap3d import geodetic2ned
 
 from polyins.errors import InputError
-from polyins.simulation.gnss import fixes, with_lies
+from polyins.simulation.gnss import fixes, with_wrong_fixes
 from polyins.simulation.path import drive
 
 DRIVE = drive(200.0, static=20.0, seed=1)
@@ -67,7 +67,7 @@ def test_slow_errors_wander_within_their_time_and_are_not_what_the_stream_claims
 def test_lies_are_of_their_size_and_nowhere_else():
     honest = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(3), position_std=0.01)
     among = np.arange(50, 150)
-    lying, chosen = with_lies(honest, among, 8, 30.0, np.random.default_rng(4))
+    lying, chosen = with_wrong_fixes(honest, among, 8, 30.0, np.random.default_rng(4))
     apart = offsets(lying.position, honest.position)
     assert chosen.size == 8
     assert np.isin(chosen, among).all()
@@ -80,4 +80,4 @@ def test_lies_are_of_their_size_and_nowhere_else():
 def test_more_lies_than_fixes_are_refused():
     honest = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(3), position_std=0.01)
     with pytest.raises(InputError, match="4 lies among 3 fixes"):
-        with_lies(honest, np.arange(3), 4, 30.0, np.random.default_rng(4))
+        with_wrong_fixes(honest, np.arange(3), 4, 30.0, np.random.default_rng(4))

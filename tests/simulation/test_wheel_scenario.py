@@ -9,12 +9,12 @@ from polyins.reading.loading import load
 from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.files import write
 from polyins.simulation.run import record, simulate, simulate_with_truth, true_run
-from polyins.simulation.scenario import Board, Errors, Scenario, read_scenario
-from polyins.simulation.wheel_scenario import Slip, Track, WheelModule
+from polyins.simulation.scenario import Board, Scenario, SensorErrors, read_scenario
+from polyins.simulation.wheel_scenario import Slip, SurveyedTrack, WheelModule
 from polyins_papers.vehicles import ROBOT
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "robot.yaml"
-PERFECT = Errors(noise=False, biases=False, scales=False)
+PERFECT = SensorErrors(noise=False, biases=False, scales=False)
 WHEELS = (
     WheelModule(name="left", position_m=(0.0, -0.165, 0.0), radius_m=0.097, chips=2),
     WheelModule(name="right", position_m=(0.0, 0.165, 0.0), radius_m=0.097, chips=1, lever_arm_m=(0.0, 0.0, -0.02)),
@@ -74,7 +74,7 @@ def test_perfect_chips_show_their_wheel_s_speed_and_the_earth_s_rate(earth):
 
 
 def test_the_calibrated_radius_fits_the_scaled_gyro():
-    errors = Errors(noise=False, biases=False, turn_on_share=1.0)
+    errors = SensorErrors(noise=False, biases=False, turn_on_share=1.0)
     simulation, bare = simulate_with_truth(changed(errors=errors)), simulate(changed(errors=PERFECT))
     for index in (2, 3, 4):
         known, true = simulation.recording.rig.imus[index].wheel.radius, bare.rig.imus[index].wheel.radius
@@ -213,7 +213,7 @@ def test_a_track_without_its_columns_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"odometer\.csv: .*speed_m_s"):
         simulate(scenario)
     with pytest.raises(InputError, match=r"nowhere\.csv"):
-        simulate(changed(track=Track(file="nowhere.csv", odometer="nowhere.csv")))
+        simulate(changed(track=SurveyedTrack(file="nowhere.csv", odometer="nowhere.csv")))
 
 
 @pytest.mark.parametrize(

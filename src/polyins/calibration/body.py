@@ -11,18 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from polyins.calibration.motion import Motion, Running
+from polyins.calibration.motion import Motion, RunningSums
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
 from polyins.model.recording import Array
-from polyins.model.rig import DEG
+from polyins.model.rig import DEG, STANDARD_GRAVITY
 
 WINDOW = 2.0  # s
 STEP = 0.25  # s
 SPEED_WINDOW = 0.2  # s
 LEAST_SPEED = 1.5  # m/s
 LEAST_TIME = 10.0  # s
-GRAVITY = 9.80665  # m/s^2
 CROSSFALL_STD = 1.0 * DEG
 """Roads fall to the side, and nothing in a drive tells that from a roll of the mount."""
 SLOPE_STD = 2.0 * DEG
@@ -39,7 +38,7 @@ class Mount:
     """rad, shape (3,)"""
 
 
-def mount(body: Motion, rolled: Running, height: Running | None, name: str) -> Mount:
+def mount(body: Motion, rolled: RunningSums, height: RunningSums | None, name: str) -> Mount:
     """Find what is left of the mounting angles of a body IMU whose stream is nearly forward-right-down.
 
     `rolled`: way, m, and upward yaw, rad, of the middle of the axle; `height`: of the antenna, m, None: the road is
@@ -58,7 +57,7 @@ def mount(body: Motion, rolled: Running, height: Running | None, name: str) -> M
     slope = np.zeros(len(middle)) if height is None else height.between(begin, end)[:, 0] / way
     forward = np.array([1.0, 0.0, 0.0])
     for _ in range(2):  # gravity along the slope is felt along the forward axis, which is known better the second time
-        level = force - GRAVITY * slope[:, None] * forward
+        level = force - STANDARD_GRAVITY * slope[:, None] * forward
         fits = [fit(design, level[:, k], piece, weights) for k in range(3)]
         angles, std = _angles(fits)
         forward = np.array([np.cos(angles[2]), -np.sin(angles[2]), 0.0])
@@ -66,7 +65,7 @@ def mount(body: Motion, rolled: Running, height: Running | None, name: str) -> M
     return Mount(angles, np.hypot(std, unknown))
 
 
-def _driving(body: Motion, rolled: Running, height: Running | None) -> Array:
+def _driving(body: Motion, rolled: RunningSums, height: RunningSums | None) -> Array:
     """Return the middles of windows in which all is known and the vehicle drives, s."""
     spans = [(float(body.edges[0]), float(body.edges[-1])), rolled.span, *([height.span] if height else [])]
     reach = 0.5 * (WINDOW + SPEED_WINDOW)
@@ -77,7 +76,7 @@ def _driving(body: Motion, rolled: Running, height: Running | None) -> Array:
     return np.asarray(middle[np.abs(way) > LEAST_SPEED * WINDOW])
 
 
-def _speed(rolled: Running, at: Array) -> Array:
+def _speed(rolled: RunningSums, at: Array) -> Array:
     return rolled.between(at - 0.5 * SPEED_WINDOW, at + 0.5 * SPEED_WINDOW)[:, 0] / SPEED_WINDOW
 
 
@@ -95,4 +94,4 @@ def _angles(fits: list[Fit]) -> tuple[Array, Array]:
     # that the two disagree by more than their std counts too
     scatter = abs(yaws[0] - yaws[1]) * np.sqrt(trust.prod()) / trust.sum()
     yaw_spread = np.hypot(trust.sum() ** -0.5, scatter)
-    return np.array([roll, pitch, yaw]), np.array([std[1, 2] / GRAVITY, std[0, 2] / GRAVITY, yaw_spread])
+    return np.array([roll, pitch, yaw]), np.array([*std[[1, 0], 2] / STANDARD_GRAVITY, yaw_spread])

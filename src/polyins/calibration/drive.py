@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from polyins.calibration.body import mount
-from polyins.calibration.motion import Motion, Running, motion
+from polyins.calibration.motion import Motion, RunningSums, motion
 from polyins.calibration.radius import rolling_radius
 from polyins.calibration.wheels import SpinAxis, lever_arm, spin_axis, turns
 from polyins.config import WheelEntry
@@ -49,18 +49,18 @@ class Calibration:
 
 
 @dataclass(frozen=True)
-class _Wheel:
+class _WheelMotion:
     """A wheel IMU and its way of rolling; the axis has the sense of the net rotation until forward is known."""
 
     imu: Imu
     motion: Motion
     spin: SpinAxis
-    turns: Running
+    turns: RunningSums
 
-    def facing(self, sense: float) -> _Wheel:
+    def facing(self, sense: float) -> _WheelMotion:
         """Return it with the axis about which it rolls forward; `sense`: 1 if the net rotation is forward, else -1."""
         spin = replace(self.spin, axis=self.spin.axis * sense)
-        return replace(self, spin=spin, turns=Running(self.turns.edges, self.turns.sums * [sense, 1.0]))
+        return replace(self, spin=spin, turns=RunningSums(self.turns.edges, self.turns.sums * [sense, 1.0]))
 
 
 def calibrate(recording: Recording) -> Calibration:
@@ -85,7 +85,7 @@ def calibrate(recording: Recording) -> Calibration:
         imus[wheel.imu.name] = estimates
         radii[wheel.imu.name] = _number(estimates, "wheel.radius_m", _nominal_radius(wheel.imu))
     rolled = _axle(wheels, radii)
-    height = None if track is None else Running(track.edges, -track.sums[:, 2:])
+    height = None if track is None else RunningSums(track.edges, -track.sums[:, 2:])
     for imu, moved in bodies:
         imus[imu.name] = _body_estimates(imu, moved, rolled, height)
     warnings += [text for name, estimates in imus.items() for text in _surprises(name, estimates)]
@@ -93,9 +93,9 @@ def calibrate(recording: Recording) -> Calibration:
     return Calibration(in_order, forward_from, recording.clock_offsets, tuple(warnings))
 
 
-def _rolling(imu: Imu, moved: Motion) -> _Wheel:
+def _rolling(imu: Imu, moved: Motion) -> _WheelMotion:
     found = spin_axis(moved, imu.name)
-    return _Wheel(imu, moved, found, turns(moved, found))
+    return _WheelMotion(imu, moved, found, turns(moved, found))
 
 
 def _nominal_radius(imu: Imu) -> float:
@@ -110,16 +110,16 @@ def _number(estimates: Sequence[Estimate], key: str, otherwise: float) -> float:
     return otherwise
 
 
-def _track(recording: Recording, warnings: list[str]) -> Running | None:
+def _track(recording: Recording, warnings: list[str]) -> RunningSums | None:
     """Return the antenna's positions, m north, east, down of the first one."""
     gnss = recording.gnss
     if gnss is None:
         warnings.append("no GNSS: radii stay as configured, and the road counts as level for the body's pitch")
         return None
-    return Running(gnss.time, displacement(gnss.position, gnss.position[0], recording.geodetic))
+    return RunningSums(gnss.time, displacement(gnss.position, gnss.position[0], recording.geodetic))
 
 
-def _sense(wheels: Sequence[_Wheel], bodies: Sequence[tuple[Imu, Motion]]) -> tuple[float, str]:
+def _sense(wheels: Sequence[_WheelMotion], bodies: Sequence[tuple[Imu, Motion]]) -> tuple[float, str]:
     """Return 1 if the net rotation of the wheels is forward, else -1, and how that is known.
 
     Where a body IMU feels the wheels' acceleration along its forward axis, the axis says it; else most of a drive is
@@ -140,7 +140,7 @@ def _sense(wheels: Sequence[_Wheel], bodies: Sequence[tuple[Imu, Motion]]) -> tu
     return 1.0, "most of the way is taken to be forward"
 
 
-def _wheel_estimates(wheel: _Wheel, track: Running | None, antenna: Array) -> tuple[Estimate, ...]:
+def _wheel_estimates(wheel: _WheelMotion, track: RunningSums | None, antenna: Array) -> tuple[Estimate, ...]:
     imu = wheel.imu
     assert imu.wheel is not None
     rightward = -imu.rotation.T @ wheel.spin.axis  # rolling forward turns about the axle to the left
@@ -157,7 +157,7 @@ def _wheel_estimates(wheel: _Wheel, track: Running | None, antenna: Array) -> tu
     return mounting if track is None else (*_by_track(wheel, track, antenna), *mounting)
 
 
-def _by_track(wheel: _Wheel, track: Running, antenna: Array) -> tuple[Estimate, ...]:
+def _by_track(wheel: _WheelMotion, track: RunningSums, antenna: Array) -> tuple[Estimate, ...]:
     """Return the rolling radius, and of a wheel that is not steered its place beside the antenna."""
     imu = wheel.imu
     assert imu.wheel is not None
@@ -177,7 +177,7 @@ def _named(axis: Array) -> tuple[str, tuple[float, float]]:
     return name, (float(axis[(k + 1) % 3] / axis[k] / DEG), float(axis[(k + 2) % 3] / axis[k] / DEG))
 
 
-def _lever_arm(wheel: _Wheel, spin_name: str, tilt: tuple[float, float]) -> Estimate:
+def _lever_arm(wheel: _WheelMotion, spin_name: str, tilt: tuple[float, float]) -> Estimate:
     """Return the lever arm from the IMU to the wheel's centre in the module's axes; along the axle as configured."""
     imu = wheel.imu
     assert imu.wheel is not None
@@ -192,7 +192,7 @@ def _lever_arm(wheel: _Wheel, spin_name: str, tilt: tuple[float, float]) -> Esti
     return Estimate("wheel.lever_arm_m", (float(imu.wheel.lever_arm[0]), y, z), (0.0, *std.tolist()), configured)
 
 
-def _axle(wheels: Sequence[_Wheel], radii: dict[str, float]) -> Running:
+def _axle(wheels: Sequence[_WheelMotion], radii: dict[str, float]) -> RunningSums:
     """Return way and upward yaw of the middle of the axle, from the wheels that are not steered, if there are any."""
     used = [wheel for wheel in wheels if wheel.imu.wheel and not wheel.imu.wheel.steering] or wheels
     begin = max(wheel.turns.span[0] for wheel in used)
@@ -205,10 +205,10 @@ def _axle(wheels: Sequence[_Wheel], radii: dict[str, float]) -> Running:
     for wheel in used:
         spin, yaw = wheel.turns.between(np.full(len(edges), begin), edges).T
         sums.append(np.column_stack([radii[wheel.imu.name] * spin - wheel.imu.position[1] * yaw, yaw]))
-    return Running(edges, np.mean(sums, axis=0))
+    return RunningSums(edges, np.mean(sums, axis=0))
 
 
-def _body_estimates(imu: Imu, moved: Motion, rolled: Running, height: Running | None) -> tuple[Estimate, ...]:
+def _body_estimates(imu: Imu, moved: Motion, rolled: RunningSums, height: RunningSums | None) -> tuple[Estimate, ...]:
     from scipy.spatial.transform import Rotation
 
     found = mount(moved, rolled, height, imu.name)

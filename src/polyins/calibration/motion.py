@@ -11,7 +11,7 @@ from polyins.prepare.timesync import GAP
 
 
 @dataclass(frozen=True)
-class Running:
+class RunningSums:
     """Sums of increments since the beginning: what lies between two instants is a difference, whatever the rate."""
 
     edges: Array
@@ -51,10 +51,10 @@ class Motion:
         """Nominal rate: one over the median interval."""
         return float(1.0 / np.median(self.steps))
 
-    def running(self, rates: Array) -> Running:
+    def running(self, rates: Array) -> RunningSums:
         """Integrate rates, shape (T, K)."""
         increments = rates * self.steps[:, None]
-        return Running(self.edges, np.vstack([np.zeros(rates.shape[1]), np.cumsum(increments, axis=0)]))
+        return RunningSums(self.edges, np.vstack([np.zeros(rates.shape[1]), np.cumsum(increments, axis=0)]))
 
 
 def motion(stream: ImuStream) -> Motion:

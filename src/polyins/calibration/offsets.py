@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from polyins.calibration.motion import Running, motion
+from polyins.calibration.motion import RunningSums, motion
 from polyins.calibration.regression import BLOCKS, blocks, huber, jackknife_covariance
 from polyins.calibration.wheels import spin_axis, turns
 from polyins.errors import InputError
@@ -54,7 +54,7 @@ class Signals(Protocol):
 
 
 @dataclass(frozen=True)
-class Path:
+class Positions:
     """Horizontal positions, compared by the distances between them."""
 
     time: Array
@@ -69,7 +69,7 @@ class Path:
 
     def between(self, begin: Array, end: Array) -> Array:
         """Return the distances between two instants, m, shape (M, 1)."""
-        chord = Running(self.time, self.position).between(begin, end)
+        chord = RunningSums(self.time, self.position).between(begin, end)
         return np.asarray(np.linalg.norm(chord, axis=1)[:, None])
 
 
@@ -77,7 +77,7 @@ class Path:
 class Mean:
     """The mean of several streams on one clock: of the wheels on both sides it is the middle of the axle's."""
 
-    parts: Sequence[Running]
+    parts: Sequence[RunningSums]
 
     @property
     def span(self) -> tuple[float, float]:
@@ -120,7 +120,7 @@ def gnss_offset(
         raise InputError(f"{name}: its clock's offset is found by wheel speed; expected an IMU on a wheel")
     rolling = Mean([_imu_signals(imus[i], streams[i]) for i in straight or wheels])
     position = displacement(gnss.position, gnss.position[0], geodetic)
-    path = Path(gnss.time, position[:, :2])
+    path = Positions(gnss.time, position[:, :2])
     return find_offset(name, path, "the wheels", rolling)
 
 
@@ -174,12 +174,12 @@ def reversed_offset(one: Offset, name: str) -> Offset:
     return replace(one, name=name, offset_s=-one.offset_s)
 
 
-def _imu_signals(imu: Imu, stream: ImuStream) -> Running:
+def _imu_signals(imu: Imu, stream: ImuStream) -> RunningSums:
     moved = motion(stream)
     if imu.wheel is None:
         return moved.running(moved.rate)
     spin_and_yaw = turns(moved, spin_axis(moved, imu.name))
-    return Running(spin_and_yaw.edges, spin_and_yaw.sums[:, :1]) if imu.wheel.steering else spin_and_yaw
+    return RunningSums(spin_and_yaw.edges, spin_and_yaw.sums[:, :1]) if imu.wheel.steering else spin_and_yaw
 
 
 def _windows(signals: Signals, step: float) -> tuple[Array, Array]:
@@ -197,7 +197,7 @@ def _search(signals: Signals, base: Signals, pair: str) -> float:
     if min(len(one), len(two)) * COARSE_STEP < SHORTEST_COMMON:
         raise InputError(f"time_offset: {pair}: one has less than {SHORTEST_COMMON:g} s of data; expected more")
     for windows, source in ((one, signals), (two, base)):
-        limit = LEAST_DISTANCE if isinstance(source, Path) else LEAST_TURN
+        limit = LEAST_DISTANCE if isinstance(source, Positions) else LEAST_TURN
         if np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=0)).max() < limit:
             raise InputError(f"time_offset: {pair} share no common motion: one hardly moves; expected a drive")
     lags, gain = _gains(one, two, least / COARSE_STEP)
@@ -306,8 +306,8 @@ def _left_out(one: Array, two: Array, weights: Array) -> Array:
 def _peak(at: Array, values: Array) -> float:
     """Return where the parabola through the values about the largest one has its top."""
     best = int(np.clip(np.argmax(values), 3, len(values) - 4))
-    near = slice(best - 3, best + 4)
-    square, slope, _ = np.polyfit(at[near] - at[best], values[near], 2)
+    around = slice(best - 3, best + 4)
+    square, slope, _ = np.polyfit(at[around] - at[best], values[around], 2)
     if square >= 0.0:
         return float(at[np.argmax(values)])
     return float(at[best] + np.clip(-0.5 * slope / square, at[0] - at[best], at[-1] - at[best]))

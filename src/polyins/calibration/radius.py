@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from polyins.calibration.motion import Running
+from polyins.calibration.motion import RunningSums
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
 from polyins.model.recording import Array
@@ -14,7 +14,7 @@ LEAST_SPEED = 1.0  # m/s: slower than this the noise of a fix lengthens the way
 LEAST_DISTANCE = 50.0  # m
 
 
-def rolling_radius(turns: Running, time: Array, position: Array, name: str) -> Fit:
+def rolling_radius(turns: RunningSums, time: Array, position: Array, name: str) -> Fit:
     """Find a wheel's radius and how far to the right of the wheel the antenna is, m.
 
     `turns`: spin and upward yaw of the wheel; `position`: of the antenna at `time`, m north, east, down, shape (M, 3).

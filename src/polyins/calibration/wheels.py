@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.calibration.motion import Motion, Running, smoothed
+from polyins.calibration.motion import Motion, RunningSums, smoothed
 from polyins.calibration.regression import Fit, blocks, fit
 from polyins.errors import InputError
 from polyins.model.recording import Array
@@ -87,7 +87,7 @@ def plane(axis: Array) -> Array:
     return np.array([one, np.cross(axis, one)])
 
 
-def turns(motion: Motion, found: SpinAxis) -> Running:
+def turns(motion: Motion, found: SpinAxis) -> RunningSums:
     """Integrate the spin about the axle and the vehicle's yaw about the vertical (upwards), rad, two columns.
 
     The yaw is the part of the rate in the wheel that lies along gravity in the wheel, which needs no angle of the

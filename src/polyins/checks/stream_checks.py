@@ -11,13 +11,13 @@ from polyins.errors import InputError
 from polyins.formats.rows import ImuRows, RowSource, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
 from polyins.model.recording import Array, usual_interval
+from polyins.model.rig import STANDARD_GRAVITY
 from polyins.prepare.timesync import common_end
 
 Axes = tuple[str, str, str]
 
 GRAVITY_M_S2 = (5.0, 15.0)
 """The median size of the specific force lies between these on any vehicle."""
-STANDARD_GRAVITY = 9.80665
 MAX_TURN_RAD = 2.0
 MAX_RATE_RAD_S = 10.0
 """rms over a recording, of anything but a wheel"""

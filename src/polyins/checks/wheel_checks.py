@@ -48,7 +48,7 @@ LIKENESS = 0.02
 
 
 @dataclass(frozen=True)
-class _Wheel:
+class _ConfiguredWheel:
     """An IMU on a wheel, its motion, and where it is configured."""
 
     index: int
@@ -89,8 +89,10 @@ def check_settings(config: Config, document: Document) -> list[str]:
             place = document.place(["imus", index, "position_m"])
             warnings.append(f"{place}: IMU {imu.name} is on the middle line; is its wheel left or right of it?")
     if wheels and all(wheel.steering for _, _, wheel in wheels):
-        place = document.place(["imus", wheels[0][0], "wheel", "steering"])
-        raise InputError(f"{place}: all wheels with an IMU are steered; expected one that is not, to give speed")
+        raise document.error(
+            ["imus", wheels[0][0], "wheel", "steering"],
+            "all wheels with an IMU are steered; expected one that is not, to give speed",
+        )
     _check_modules(config, document)
     return warnings
 
@@ -98,24 +100,26 @@ def check_settings(config: Config, document: Document) -> list[str]:
 def _check_size(index: int, wheel: WheelEntry, document: Document) -> None:
     keys: list[Key] = ["imus", index, "wheel"]
     if wheel.radius_m > MAX_RADIUS_M:
-        raise InputError(f"{document.place([*keys, 'radius_m'])}: is {wheel.radius_m:g}; expected metres")
+        raise document.error([*keys, "radius_m"], f"is {wheel.radius_m:g}; expected metres")
     arm = float(np.linalg.norm(wheel.lever_arm_m))
     if arm > wheel.radius_m:
-        place = document.place([*keys, "lever_arm_m"])
-        raise InputError(f"{place}: is {arm:.3g} m long; expected metres, within the radius, {wheel.radius_m:g} m")
+        raise document.error(
+            [*keys, "lever_arm_m"], f"is {arm:.3g} m long; expected metres, within the radius, {wheel.radius_m:g} m"
+        )
     if max(abs(tilt) for tilt in wheel.tilt_deg) > MAX_TILT_DEG:
-        place = document.place([*keys, "tilt_deg"])
-        raise InputError(f"{place}: is {list(wheel.tilt_deg)}; expected at most {MAX_TILT_DEG:g} deg off spin_axis")
+        raise document.error(
+            [*keys, "tilt_deg"], f"is {list(wheel.tilt_deg)}; expected at most {MAX_TILT_DEG:g} deg off spin_axis"
+        )
 
 
 def _check_side(index: int, imu: ImuEntry, wheel: WheelEntry, document: Document) -> None:
     right = imu.position_m[1]
     if wheel.side is None or right == 0.0 or (right > 0.0) == (wheel.side == "right"):
         return
-    place = document.place(["imus", index, "wheel", "side"])
-    raise InputError(
-        f"{place}: is {wheel.side}, and position_m is {list(imu.position_m)}; expected y above zero on the right, "
-        "below on the left"
+    raise document.error(
+        ["imus", index, "wheel", "side"],
+        f"is {wheel.side}, and position_m is {list(imu.position_m)}; expected y above zero on the right, "
+        "below on the left",
     )
 
 
@@ -128,10 +132,10 @@ def _check_modules(config: Config, document: Document) -> None:
         mixed = (imu.wheel is None) != (other.wheel is None)
         if mixed or (imu.wheel is not None and apart > SAME_WHEEL_M):
             where = "on a wheel and on the body" if mixed else f"on wheels {apart:.3g} m apart"
-            place = document.place(["imus", index, "module"])
-            raise InputError(
-                f"{place}: IMU {imu.name} shares module {imu.module!r} with IMU {other.name}, {where}; expected chips "
-                "of one board"
+            raise document.error(
+                ["imus", index, "module"],
+                f"IMU {imu.name} shares module {imu.module!r} with IMU {other.name}, {where}; expected chips "
+                "of one board",
             )
 
 
@@ -169,12 +173,12 @@ def check_motion(
     return warnings
 
 
-def _wheel(index: int, imu: Imu, entry: WheelEntry, stream: ImuStream) -> _Wheel:
+def _wheel(index: int, imu: Imu, entry: WheelEntry, stream: ImuStream) -> _ConfiguredWheel:
     rate = stream.dtheta / intervals(stream.time)[:, None]
-    return _Wheel(index, imu, entry, stream.time, rate, -np.cumsum(stream.dtheta[:, 0]))
+    return _ConfiguredWheel(index, imu, entry, stream.time, rate, -np.cumsum(stream.dtheta[:, 0]))
 
 
-def _check_sampling(wheel: _Wheel, document: Document) -> list[str]:
+def _check_sampling(wheel: _ConfiguredWheel, document: Document) -> list[str]:
     step = float(np.median(np.diff(wheel.time)))
     turn = float(np.quantile(np.linalg.norm(wheel.rate, axis=1), 0.999)) * step
     if turn <= COARSE_RAD:
@@ -185,7 +189,7 @@ def _check_sampling(wheel: _Wheel, document: Document) -> list[str]:
     return [f"{text}; what happens between samples is lost, expected at most {COARSE_RAD:g}"]
 
 
-def _check_all_turn(wheels: list[_Wheel], document: Document) -> None:
+def _check_all_turn(wheels: list[_ConfiguredWheel], document: Document) -> None:
     paces = [wheel.pace for wheel in wheels]
     for wheel, pace in zip(wheels, paces, strict=True):
         if pace < STANDS * max(paces):
@@ -195,7 +199,7 @@ def _check_all_turn(wheels: list[_Wheel], document: Document) -> None:
             )
 
 
-def _check_axis(wheel: _Wheel, document: Document) -> list[str]:
+def _check_axis(wheel: _ConfiguredWheel, document: Document) -> list[str]:
     """Compare the axis that the IMU turns about with the one declared."""
     fast = wheel.rate[np.linalg.norm(wheel.rate, axis=1) > TURNS_RAD_S]
     spin = np.linalg.eigh(fast.T @ fast)[1][:, -1]
@@ -221,7 +225,7 @@ def _named(right: Vector, k: int) -> str:
     return ("-" if right[k] < 0.0 else "") + "xyz"[k]
 
 
-def _check_direction(wheel: _Wheel, document: Document) -> None:
+def _check_direction(wheel: _ConfiguredWheel, document: Document) -> None:
     net, whole = wheel.way[-1], float(np.sum(np.abs(np.diff(wheel.way))))
     if net > -ONE_WAY * whole:
         return
@@ -233,7 +237,7 @@ def _check_direction(wheel: _Wheel, document: Document) -> None:
     )
 
 
-def _check_ways(wheels: list[_Wheel], document: Document) -> list[str]:
+def _check_ways(wheels: list[_ConfiguredWheel], document: Document) -> list[str]:
     """Compare how far the wheels roll while all are recorded."""
     if len(wheels) < 2:
         return []
@@ -250,7 +254,7 @@ def _check_ways(wheels: list[_Wheel], document: Document) -> list[str]:
     ]
 
 
-def _check_clocks(wheels: list[_Wheel], document: Document) -> list[str]:
+def _check_clocks(wheels: list[_ConfiguredWheel], document: Document) -> list[str]:
     """Look whether the speeds of two wheels are more alike with one of them shifted in time."""
     first = wheels[0]
     return [
@@ -261,7 +265,7 @@ def _check_clocks(wheels: list[_Wheel], document: Document) -> list[str]:
     ]
 
 
-def _lag(a: _Wheel, b: _Wheel) -> float:
+def _lag(a: _ConfiguredWheel, b: _ConfiguredWheel) -> float:
     """Return by how much b is later than a, s, by how both speed up and slow down; 0 if not by much."""
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     grid = np.arange(begin, end, CLOCK_STEP_S)
@@ -272,14 +276,14 @@ def _lag(a: _Wheel, b: _Wheel) -> float:
     product = np.fft.irfft(np.fft.rfft(two, size) * np.fft.rfft(one[::-1], size), size)
     likeness = product / max(float(np.linalg.norm(one) * np.linalg.norm(two)), 1e-12)
     lags = np.arange(1 - len(one), len(two)) * CLOCK_STEP_S
-    near = np.abs(lags) <= LARGEST_LAG_S
-    best = int(np.argmax(np.where(near, likeness, -1.0)))
+    plausible = np.abs(lags) <= LARGEST_LAG_S
+    best = int(np.argmax(np.where(plausible, likeness, -1.0)))
     alike = likeness[best] > likeness[lags == 0.0][0] + LIKENESS
     return float(lags[best]) if alike and abs(lags[best]) >= LAG_SHOWS_S else 0.0
 
 
 def _check_steering(
-    wheels: list[_Wheel], imus: tuple[Imu, ...], streams: tuple[ImuStream, ...], document: Document
+    wheels: list[_ConfiguredWheel], imus: tuple[Imu, ...], streams: tuple[ImuStream, ...], document: Document
 ) -> list[str]:
     """Warn of wheels that yaw otherwise than the vehicle although they are declared not to be steered."""
     chosen = [index for index, imu in enumerate(imus) if imu.wheel is None or not imu.wheel.steering]
@@ -292,7 +296,7 @@ def _check_steering(
     ]
 
 
-def _check_radius(wheel: _Wheel, gnss: GnssStream, geodetic: bool, document: Document) -> list[str]:
+def _check_radius(wheel: _ConfiguredWheel, gnss: GnssStream, geodetic: bool, document: Document) -> list[str]:
     """Compare the way rolled with the way between fixes, where it drives."""
     inside = (gnss.time >= wheel.time[0]) & (gnss.time <= wheel.time[-1])
     time, position = gnss.time[inside], gnss.position[inside]

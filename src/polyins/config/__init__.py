@@ -22,7 +22,7 @@ from polyins.config.imu import NOISE_GRADES, ImuEntry, ImuSettings, InitialError
 from polyins.config.positions import GeodeticPoint, GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling, SpinAxis, WheelEntry
 from polyins.config.sensors import HeadingEntry, HeightEntry, OdometerEntry, SensorColumns, SensorEntry
-from polyins.config.timing import Outages, OutageSchedule, Start, StartPosition
+from polyins.config.timing import Outages, OutageSchedule, StartEntry, StartPosition
 
 __all__ = [
     "NOISE_GRADES",
@@ -61,7 +61,7 @@ __all__ = [
     "SpinAxis",
     "Spread",
     "Standstill",
-    "Start",
+    "StartEntry",
     "StartPosition",
     "StdColumns",
     "TimeColumn",

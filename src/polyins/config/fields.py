@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 from pydantic_core import PydanticCustomError
@@ -92,6 +93,9 @@ def blame(key: str, problem: str) -> PydanticCustomError:
 class Section(BaseModel):
     """A mapping in the file."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {}
+    """what the model calls the values of keys, without their units, where it calls them otherwise"""
+
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     @model_validator(mode="before")
@@ -99,7 +103,7 @@ class Section(BaseModel):
     def _know_every_key(cls, values: Any) -> Any:
         for key in values if isinstance(values, dict) else ():
             if key not in cls.model_fields:
-                near = difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.5)
-                hint = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(cls.model_fields)}"
+                similar = difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.5)
+                hint = f"did you mean {similar[0]}?" if similar else f"expected one of {', '.join(cls.model_fields)}"
                 raise PydanticCustomError("unknown_key", "unknown key; {hint}", {"key": key, "hint": hint})
         return values

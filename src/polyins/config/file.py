@@ -13,11 +13,11 @@ from polyins.config.imu import ImuEntry, ImuSettings
 from polyins.config.positions import GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling
 from polyins.config.sensors import HeadingEntry, HeightEntry, OdometerEntry
-from polyins.config.timing import Outages, Start
+from polyins.config.timing import Outages, StartEntry
+from polyins.config.units import UNITS, in_unit
 from polyins.config.yaml_document import Document, Key
 from polyins.errors import InputError
 from polyins.model.recording import FilterOptions, StandstillOptions
-from polyins.model.rig import DEG
 
 REST = StandstillOptions()
 
@@ -31,25 +31,24 @@ class Standstill(Section):
     """whether it rests is judged over this time, s; the longer, the rarer a false standstill"""
     velocity_std_m_s: Positive = REST.velocity_std
     """m/s; the larger, the less a standstill weighs"""
-    rate_std_deg_s: Positive = REST.rate_std / DEG
-    """of the mean rate, deg/s; above what an idling engine shakes"""
-
-    def options(self) -> StandstillOptions:
-        """Return the same as the filter takes it."""
-        return StandstillOptions(self.interval_s, self.velocity_std_m_s, self.rate_std_deg_s * DEG)
+    rate_std_deg_s: Positive = in_unit(UNITS["deg_s"], REST.rate_std)
+    """of the mean rate, deg/s; the larger, the less a standstill weighs; above what an idling engine shakes"""
 
 
 class Filter(Section):
     """What the filter is told beyond the sensors."""
 
     gate_limit: Positive | None = FilterOptions.gate_limit
-    """a fix is rejected whose normalized innovation squared, at fourfold prediction std, exceeds this; null: none is"""
+    """a fix is rejected whose normalized innovation squared, at fourfold prediction std, exceeds
+    this; the larger, the fewer are; null: none is"""
     gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = FilterOptions.gate_reopen_after
-    """after that many rejections in a row the next fix is believed"""
+    """after that many rejections in a row the next fix is believed; the larger, the longer a wrong state
+    keeps good fixes out"""
     gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0, le=0.1)] = FilterOptions.gnss_snap
-    """a fix nearer than this to an IMU epoch is applied at that epoch, s"""
+    """a fix nearer than this to an IMU epoch is applied at that epoch, s; the larger, the fewer intervals are split,
+    and the farther a fix is moved"""
     gravity_m_s2: Positive = FilterOptions.gravity
-    """on a local tangent plane only, m/s^2"""
+    """on a local tangent plane only, m/s^2; one that is too large shows as an acceleration downwards"""
     rolling: Rolling = Rolling()
     """how wheels aid the filter"""
     standstill: Standstill | None = None
@@ -77,7 +76,7 @@ class Config(Section):
     """speeds of an encoder; that the vehicle does not slip"""
     reference: ReferenceEntry | None = None
     """what the solution is judged by"""
-    start: Start = Start()
+    start: StartEntry = StartEntry()
     """how the navigation state is found at the start"""
     outages: Outages = ()
     """intervals in which GNSS is withheld: a schedule, or a list of [from, to] in s"""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -53,22 +54,25 @@ def _axis_names(value: object) -> object:
 class Noise(Section):
     """How good an IMU is: random walks, and the std and correlation time of its slow errors (Gauss-Markov)."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {
+        name: f"{name}_std" for name in ("gyro_bias", "accel_bias", "gyro_scale", "accel_scale")
+    }
     grade: Literal["consumer-mems", "industrial-mems", "tactical"] | None = None
     """fills in what is not given below; without it consumer-mems does"""
     angle_random_walk_deg_sqrt_h: Spread
-    """deg/sqrt(h)"""
+    """deg/sqrt(h); the larger, the faster the attitude becomes unsure, and the more aids weigh"""
     velocity_random_walk_m_s_sqrt_h: Spread
-    """m/s/sqrt(h)"""
+    """m/s/sqrt(h); the larger, the faster the velocity becomes unsure, and the more aids weigh"""
     gyro_bias_deg_h: Spread
-    """std of the gyro bias, deg/h"""
+    """std of the gyro bias, deg/h; the larger, the faster the estimate may change"""
     accel_bias_mgal: Spread
-    """std of the accelerometer bias, mGal (1e-5 m/s^2)"""
+    """std of the accelerometer bias, mGal (1e-5 m/s^2); the larger, the faster the estimate may change"""
     gyro_scale_ppm: Spread
-    """std of the gyro scale factor, ppm"""
+    """std of the gyro scale factor, ppm; the larger, the faster the estimate may change in turns"""
     accel_scale_ppm: Spread
-    """std of the accelerometer scale factor, ppm"""
+    """std of the accelerometer scale factor, ppm; the larger, the faster the estimate may change under acceleration"""
     correlation_time_h: Positive
-    """of all four, h"""
+    """of all four, h; the larger, the slower they change and the longer an estimate holds"""
 
     @model_validator(mode="before")
     @classmethod
@@ -100,13 +104,14 @@ class InitialStd(Section):
     """How sure the initial errors are, 1 sigma; what is not given is as in `noise`."""
 
     gyro_bias_deg_s: Spread | None = None
-    """deg/s, the chip's turn-on bias; unused where a standstill at the start shows the bias itself"""
+    """deg/s, the chip's turn-on bias; the larger, the faster the estimate leaves initial_errors; unused where a
+    standstill at the start shows the bias itself"""
     accel_bias_m_s2: Spread | None = None
-    """m/s^2"""
+    """m/s^2; the larger, the faster the estimate leaves initial_errors"""
     gyro_scale_ppm: Spread | None = None
-    """ppm"""
+    """ppm; the larger, the faster the estimate leaves initial_errors in turns"""
     accel_scale_ppm: Spread | None = None
-    """ppm"""
+    """ppm; the larger, the faster the estimate leaves initial_errors under acceleration"""
 
 
 class ImuSettings(Section):
@@ -119,11 +124,12 @@ class ImuSettings(Section):
     rate_hz: Positive | None = None
     """take row number / rate_hz as the time and ignore the stamps"""
     clock_offset_s: Number = 0.0
-    """added to the stamps, s"""
+    """added to the stamps, s; the larger, the later the samples count"""
     time_offset: Literal["estimate"] | None = None
     """estimate: what is left of the clock's offset is found from the motion that this IMU shares with the others"""
     gyro_range_deg_s: Positive | None = None
-    """full scale of the gyro, deg/s: what reaches it is left out; without it that of the format, where it is known"""
+    """full scale of the gyro, deg/s: what reaches it is left out; the larger, the less is; without it that of the
+    format, where it is known"""
     axes: Annotated[tuple[str, str, str], BeforeValidator(_axis_names)] = FORWARD_RIGHT_DOWN
     """which sensor axes point forward, right and down in the array"""
     mount_deg: Triple = ORIGIN
@@ -135,7 +141,8 @@ class ImuSettings(Section):
     module: str = ""
     """of the board that it shares with other chips at the same place"""
     mount_std_deg: NotNegative = 0.0
-    """of pitch and yaw on a vehicle's body, deg; above zero the filter estimates them"""
+    """of pitch and yaw on a vehicle's body, deg; above zero the filter estimates them; the larger, the faster they
+    leave mount_deg"""
     noise: Noise = Field(default_factory=lambda: Noise.model_validate("consumer-mems"))
     """how good the sensor is: a mapping, or just the name of a grade"""
     initial_errors: InitialErrors = InitialErrors()

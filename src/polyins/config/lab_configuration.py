@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 from polyins.config.yaml_document import Document, Key
-from polyins.errors import InputError
 
 NOISE = {
     "arw": "angle_random_walk_deg_sqrt_h",
@@ -31,7 +30,7 @@ class Reader:
         """Return a file name."""
         value = self._value(keys)
         if not isinstance(value, str):
-            raise InputError(f"{self._document.place(keys)}: is {value!r}; expected a file name")
+            raise self._document.error(keys, f"is {value!r}; expected a file name")
         return value
 
     def number(self, *keys: Key) -> float:
@@ -43,14 +42,14 @@ class Reader:
         value = self._value(keys)
         values = value if isinstance(value, list) else 3 * [value]
         if len(values) < 3:
-            raise InputError(f"{self._document.place(keys)}: is {value!r}; expected three numbers, like [0, 0, 0]")
+            raise self._document.error(keys, f"is {value!r}; expected three numbers, like [0, 0, 0]")
         return [self._as_number(item, keys) for item in values[:3]]
 
     def spread(self, *keys: Key) -> list[float]:
         """Return three numbers that are not negative."""
         values = self.three(*keys)
         if min(values) < 0.0:
-            raise InputError(f"{self._document.place(keys)}: is {values}; expected no negative number")
+            raise self._document.error(keys, f"is {values}; expected no negative number")
         return values
 
     def _value(self, keys: tuple[Key, ...]) -> Any:
@@ -58,8 +57,7 @@ class Reader:
         for key in keys:
             value = value.get(key) if isinstance(value, dict) else None
             if value is None:
-                place = self._document.place(keys)
-                raise InputError(f"{place}: is missing; expected it in a {self._program} configuration")
+                raise self._document.error(keys, f"is missing; expected it in a {self._program} configuration")
         return value
 
     def _as_number(self, value: Any, keys: tuple[Key, ...]) -> float:
@@ -69,7 +67,7 @@ class Reader:
                 raise ValueError
             return float(value)
         except (TypeError, ValueError) as error:
-            raise InputError(f"{self._document.place(keys)}: is {value!r}; expected a number") from error
+            raise self._document.error(keys, f"is {value!r}; expected a number") from error
 
 
 def noise(read: Reader) -> dict[str, Any]:

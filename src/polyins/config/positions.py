@@ -31,15 +31,15 @@ class GnssEntry(Section):
     columns: TrackColumns | None = None
     """of a table; without it the table has the columns that polyins writes"""
     clock_offset_s: Number = 0.0
-    """added to the stamps, s"""
+    """added to the stamps, s; the larger, the later the positions count"""
     time_offset: Literal["estimate"] | None = None
     """estimate: what is left of the clock's offset is found from the motion that the IMUs show too"""
     antenna_position_m: Triple = ORIGIN
     """of the antenna from the array's origin: forward, right, down, m"""
     position_std_m: Spread | None = None
-    """north, east, down, m; takes the place of what the file says"""
+    """north, east, down, m; takes the place of what the file says; the larger, the less fixes weigh"""
     rate_hz: Positive | None = None
-    """thin the fixes to this rate"""
+    """thin the fixes to this rate; the larger, the more of them are used"""
     height: Literal["ellipsoidal", "sea-level"] = "ellipsoidal"
     """what heights count from"""
     geoid_height_m: Number | None = None
@@ -58,7 +58,7 @@ class ReferenceEntry(Section):
     columns: TrackColumns | None = None
     """of a table; without it the table has the columns that polyins writes"""
     clock_offset_s: Number = 0.0
-    """added to the stamps, s"""
+    """added to the stamps, s; the larger, the later the positions count"""
     position_lag_s: Number = 0.0
     """position and velocity belong to an instant that much later than the attitude of the same row, s"""
     point_m: Triple = ORIGIN

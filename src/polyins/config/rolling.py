@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-import numpy as np
 from pydantic import model_validator
 
 from polyins.config.fields import ORIGIN, NotNegative, Pair, Positive, PositiveSpread, Section, Triple, blame
@@ -39,28 +38,29 @@ class WheelEntry(Section):
     steering: bool = False
     """it is steered: it gives no speed and does not navigate"""
     radius_std: NotNegative = 0.0
-    """relative; above zero the filter estimates the radius"""
+    """relative; above zero the filter estimates the radius; the larger, the faster it leaves radius_m"""
     lever_arm_std_m: NotNegative = 0.0
-    """of both components in the wheel, m; above zero the filter estimates them"""
+    """of both components in the wheel, m; above zero the filter estimates them; the larger, the faster they leave
+    lever_arm_m"""
 
 
 class Rolling(Section):
     """How wheels aid the filter; the defaults are paper B's."""
 
     speed_interval_s: Positive = SPEED.speed_interval
-    """from one update by wheel speed to the next, s"""
+    """from one update by wheel speed to the next, s; the larger, the less wheels weigh"""
     speed_window_s: Positive = SPEED.speed_window
-    """the speed is the mean over this time before the update, s"""
+    """the speed is the mean over this time before the update, s; the larger, the smoother and the later it is"""
     predict: Literal["window", "end"] = "window"
     """compare the mean speed with the mean velocity over the same window, or with the velocity at its end"""
     wheel_speed_std_m_s: PositiveSpread = _three(SPEED.wheel_speed_std)
-    """forward, right, down, of IMUs on wheels, m/s"""
+    """forward, right, down, of IMUs on wheels, m/s; the larger, the less speed and rolling without slip weigh"""
     body_speed_std_m_s: PositiveSpread = _three(SPEED.body_speed_std)
-    """forward, right, down, of IMUs on the body, m/s"""
+    """forward, right, down, of IMUs on the body, m/s; the larger, the less the wheels' speed weighs there"""
     constraint_interval_s: Positive = SPEED.constraint_interval
-    """from one update by the reference point to the next, s"""
+    """from one update by the reference point to the next, s; the larger, the farther modules drift apart between"""
     constraint_std_m: Positive = SPEED.constraint_std
-    """of each component of the reference point, m"""
+    """of each component of the reference point, m; the larger, the looser modules are held together"""
     standstill: bool = SPEED.standstill
     """look for standstills and update by zero velocity and zero rate there"""
 
@@ -70,16 +70,3 @@ class Rolling(Section):
         if window <= interval:
             return self
         raise blame("speed_window_s", f"is {window:g}; expected at most speed_interval_s, {interval:g}")
-
-    def options(self) -> RollingOptions:
-        """Return the same as the filter takes it."""
-        return RollingOptions(
-            speed_interval=self.speed_interval_s,
-            speed_window=self.speed_window_s,
-            predict=self.predict,
-            wheel_speed_std=np.array(self.wheel_speed_std_m_s),
-            body_speed_std=np.array(self.body_speed_std_m_s),
-            constraint_interval=self.constraint_interval_s,
-            constraint_std=self.constraint_std_m,
-            standstill=self.standstill,
-        )

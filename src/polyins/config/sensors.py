@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
 from polyins.config.columns import TimeColumn
 from polyins.config.fields import ORIGIN, Column, NotNegative, Number, Positive, Section, Triple
@@ -29,7 +30,7 @@ class SensorEntry(Section):
     columns: SensorColumns | None = None
     """of the table; without it time_s and height_m, heading_deg or speed_m_s"""
     clock_offset_s: Number = 0.0
-    """added to the stamps, s"""
+    """added to the stamps, s; the larger, the later the values count"""
     position_m: Triple = ORIGIN
     """the point whose height or velocity it shows, from the array's origin: forward, right, down, m"""
 
@@ -37,10 +38,13 @@ class SensorEntry(Section):
 class HeightEntry(SensorEntry):
     """Heights of a barometer, or known ones, above what the heights of GNSS are above."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {"bias_std": "offset_std", "bias_random_walk": "offset_random_walk"}
+
     std_m: Positive | None = None
     """m; takes the place of what the file says; the larger, the less heights weigh"""
     bias_std_m: NotNegative = 0.0
-    """of the difference from the height of GNSS at the start, m; above zero the filter estimates it"""
+    """of the difference from the height of GNSS at the start, m; above zero the filter estimates it; the larger, the
+    more GNSS decides on the height"""
     bias_random_walk_m_sqrt_s: NotNegative = 0.0
     """of that difference; the larger, the faster the estimate follows the weather"""
 
@@ -51,19 +55,25 @@ class HeadingEntry(SensorEntry):
     std_deg: Positive | None = None
     """deg; takes the place of what the file says; the larger, the less headings weigh"""
     offset_std_deg: NotNegative = 0.0
-    """of a constant offset from the heading of the array, deg; above zero the filter estimates it"""
+    """of a constant offset from the heading of the array, deg; above zero the filter estimates it; the larger, the less
+    headings say of the array's until it is known"""
 
 
 class OdometerEntry(SensorEntry):
     """The speed of an encoder, and that the vehicle moves neither sideways nor up at `position_m`."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {"scale_std": "offset_std"}
+
     std_m_s: Positive | None = None
     """of the speed, m/s; takes the place of what the file says; the larger, the less speeds weigh"""
     right_std_m_s: NotNegative = 0.1
-    """of the velocity to the right, which is taken for zero, m/s; 0: it is not"""
+    """of the velocity to the right, which is taken for zero, m/s; the larger, the more slip is allowed for; 0: it is
+    not taken for zero"""
     down_std_m_s: NotNegative = 0.1
-    """of the velocity down, likewise, m/s"""
+    """of the velocity down, likewise, m/s; the larger, the more the vehicle may bounce"""
     scale_std: NotNegative = 0.0
-    """of a constant relative error of the speed; above zero the filter estimates it"""
+    """of a constant relative error of the speed; above zero the filter estimates it; the larger, the more GNSS decides
+    on the scale"""
     constraint_interval_s: Positive | None = None
-    """from one update by the latter two alone to the next, s; without it only where there is a speed"""
+    """from one update by right_std_m_s and down_std_m_s alone to the next, s; the larger, the less they weigh; without
+    it only where there is a speed"""

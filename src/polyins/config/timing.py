@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from polyins.config.fields import Number, Pair, Positive, Section, Spread, Triple, number
+from polyins.model.rig import DEG
 
 ROUNDING_S = 1e-6
 """what time stamps such as GPS seconds of the week are exact to"""
@@ -32,6 +35,12 @@ class StartPosition(Section):
         """Whether latitude and longitude are given."""
         return self.latitude_deg is not None
 
+    def coordinates(self) -> NDArray[np.float64]:
+        """Return latitude, longitude, rad, and height, or north, east and height, m, shape (3,)."""
+        if self.latitude_deg is not None and self.longitude_deg is not None:
+            return np.array([self.latitude_deg * DEG, self.longitude_deg * DEG, self.height_m])
+        return np.array([self.north_m, self.east_m, self.height_m], dtype=float)
+
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         given = [self.latitude_deg, self.longitude_deg, self.north_m, self.east_m]
@@ -40,7 +49,7 @@ class StartPosition(Section):
         return self
 
 
-class Start(Section):
+class StartEntry(Section):
     """How the navigation state is found at the start; what is not given is found from the data."""
 
     time_s: Number | None = None
@@ -60,11 +69,11 @@ class Start(Section):
     static_interval_s: Pair | None = None
     """the array stands still from, to, s; without it looked for"""
     position_std_m: Spread | None = None
-    """north, east, down, m"""
+    """north, east, down, m; the larger, the faster aids correct the position at the start"""
     velocity_std_m_s: Spread | None = None
-    """north, east, down, m/s"""
+    """north, east, down, m/s; the larger, the faster aids correct the velocity at the start"""
     attitude_std_deg: Spread | None = None
-    """roll, pitch, heading, deg"""
+    """roll, pitch, heading, deg; the larger, the faster aids correct the attitude at the start"""
     estimate_gyro_bias: bool = True
     """take the mean of the gyros over a static interval as their bias"""
 

@@ -11,7 +11,6 @@ from typing import Any
 
 from polyins.config.lab_configuration import Reader, noise, warnings
 from polyins.config.yaml_document import Document
-from polyins.errors import InputError
 
 GRAVITY_M_S2 = 9.782940329221166
 SPEED_WINDOW_S = 0.1
@@ -74,8 +73,9 @@ def translated(document: Document) -> tuple[dict[str, Any], tuple[str, ...]]:
 
 def _check_columns(read: Reader, document: Document) -> None:
     if "imudatalen" in document.values and read.number("imudatalen") != IMU_COLUMNS:
-        place = document.place(["imudatalen"])
-        raise InputError(f"{place}: is {document.values['imudatalen']}; expected {IMU_COLUMNS} (s, 3 rates, 3 forces)")
+        raise document.error(
+            ["imudatalen"], f"is {document.values['imudatalen']}; expected {IMU_COLUMNS} (s, 3 rates, 3 forces)"
+        )
 
 
 def _not_used(read: Reader, document: Document) -> list[str]:

@@ -6,12 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.config import WheelEntry
-from polyins.model.rig import DEG, Wheel
-
-
-def wheel(entry: WheelEntry) -> Wheel:
-    """Convert a wheel section to SI; raises InputError for what cannot be right."""
-    return Wheel(entry.radius_m, np.array(entry.lever_arm_m), entry.steering, entry.radius_std, entry.lever_arm_std_m)
+from polyins.model.rig import DEG
 
 
 def wheel_rotation(entry: WheelEntry) -> NDArray[np.float64]:

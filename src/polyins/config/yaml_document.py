@@ -30,13 +30,17 @@ class Document:
         where = f"{self.path}, line {line}" if line else str(self.path)
         return f"{where}: {key_path(keys)}" if keys else where
 
+    def error(self, keys: Sequence[Key], problem: str) -> InputError:
+        """Return the error to raise for a value, which says where it stands."""
+        return InputError(f"{self.place(keys)}: {problem}")
+
     @contextmanager
     def at(self, keys: Sequence[Key]) -> Iterator[None]:
         """Put the place of a value before the message of an InputError from the block."""
         try:
             yield
         except InputError as error:
-            raise InputError(f"{self.place(keys)}: {error}") from error
+            raise self.error(keys, str(error)) from error
 
     def _line(self, keys: Sequence[Key]) -> int | None:
         node: Any = self._tree

@@ -159,8 +159,8 @@ def _place(path: Path, names: Sequence[str], column: Column) -> int:
         return column - 1
     if column not in names:
         present = [name for name in names if name]
-        near = difflib.get_close_matches(column, present, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(present) or '1, 2, ...'}"
+        similar = difflib.get_close_matches(column, present, n=1, cutoff=0.4)
+        hint = f"did you mean {similar[0]!r}?" if similar else f"expected one of {', '.join(present) or '1, 2, ...'}"
         raise InputError(f"{path}: no column {column!r}; {hint}")
     return names.index(column)
 

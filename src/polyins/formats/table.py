@@ -15,12 +15,11 @@ from polyins.formats.arrow_arrays import to_arrow
 from polyins.formats.columns import Column, column_names, read_columns
 from polyins.formats.rows import ImuRows, RowSource, Track, intervals
 from polyins.model.recording import Array, GnssStream, ImuStream
-from polyins.model.rig import DEG
+from polyins.model.rig import DEG, STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from polyins.config import ImuColumns, TrackColumns
 
-STANDARD_GRAVITY = 9.80665
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 RADIANS = {"rad/s": 1.0, "rad": 1.0, "deg/s": DEG, "deg": DEG}
 METRES = {"m/s^2": 1.0, "m/s": 1.0, "g": STANDARD_GRAVITY}

@@ -20,6 +20,7 @@ DEG = np.pi / 180.0
 MGAL = 1e-5  # m/s^2
 PPM = 1e-6
 HOUR = 3600.0
+STANDARD_GRAVITY = 9.80665  # m/s^2, the unit g
 
 MAX_LEVER_ARM_M = 100.0
 MAX_RADIUS_M = 5.0

@@ -108,8 +108,8 @@ def fetch(name: str) -> Path:
 def find(name: str) -> Dataset:
     """Return what is known of a data set; raise InputError with the nearest known one for an unknown name."""
     if name not in DATASETS:
-        near = difflib.get_close_matches(name, DATASETS, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(DATASETS)}"
+        similar = difflib.get_close_matches(name, DATASETS, n=1)
+        hint = f"did you mean {similar[0]}?" if similar else f"expected one of {', '.join(DATASETS)}"
         raise InputError(f"data set {name!r}: is unknown; {hint}")
     return DATASETS[name]
 

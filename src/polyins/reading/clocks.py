@@ -9,7 +9,6 @@ import numpy as np
 
 from polyins.config import Config, GnssEntry
 from polyins.config.yaml_document import Document
-from polyins.errors import InputError
 from polyins.model.recording import ImuStream, Offset
 from polyins.model.rig import Imu
 from polyins.reading.position_stream import read_gnss
@@ -80,9 +79,7 @@ def _shifted(streams: Sequence[ImuStream], offsets: Sequence[Offset]) -> tuple[I
 def _late(config: Config, document: Document, imus: Sequence[Imu], streams: Sequence[ImuStream]) -> Offset:
     """Return what to add to the clock of GNSS to put it on that of the IMUs, where only GNSS is not marked."""
     if config.gnss is None or config.gnss.time_offset == ESTIMATE:
-        raise InputError(
-            f"{document.place(['imus'])}: every clock has time_offset: {ESTIMATE}; expected one without, or GNSS"
-        )
+        raise document.error(["imus"], f"every clock has time_offset: {ESTIMATE}; expected one without, or GNSS")
     return _gnss_offset(config.gnss, document, imus, streams)
 
 

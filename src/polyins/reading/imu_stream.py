@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from polyins.checks import stream_checks
 from polyins.checks.faults import clipped, without_faults
-from polyins.config import ImuEntry, InitialErrors, InitialStd, Noise
-from polyins.config.wheel_mount import wheel, wheel_rotation
+from polyins.config import ImuEntry, InitialStd
+from polyins.config.units import read
+from polyins.config.wheel_mount import wheel_rotation
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.files import find_named
@@ -19,7 +20,7 @@ from polyins.formats.recognize import imu_format
 from polyins.formats.rows import ImuRows, intervals, without
 from polyins.model.axes import axes_matrix
 from polyins.model.recording import Array, ImuStream
-from polyins.model.rig import DEG, PPM, Imu, ImuErrors, NoiseGrade
+from polyins.model.rig import DEG, Imu, ImuErrors, NoiseGrade
 
 FULL = 0.999
 """A rate above this part of the full scale has reached it."""
@@ -56,17 +57,9 @@ def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
 
 def as_mounted(entry: ImuEntry) -> Imu:
     """Return what a configuration says of an IMU."""
-    return Imu(
-        entry.name,
-        noise_grade(entry.noise),
-        sensor_rotation(entry),
-        np.array(entry.position_m),
-        _initial_errors(entry.initial_errors),
-        initial_std(entry.initial_std, noise_grade(entry.noise).slow_std()),
-        wheel=None if entry.wheel is None else wheel(entry.wheel),
-        module=entry.module,
-        mount_std=entry.mount_std_deg * DEG,
-    )
+    noise = read(entry.noise, NoiseGrade)
+    std = initial_std(entry.initial_std, noise.slow_std())
+    return read(entry, Imu, noise=noise, rotation=sensor_rotation(entry), initial_std=std)
 
 
 def _rows(entry: ImuEntry, place: str) -> ImuRows:
@@ -140,29 +133,7 @@ def mount_rotation(mount_deg: tuple[float, float, float]) -> NDArray[np.float64]
     )
 
 
-def noise_grade(noise: Noise) -> NoiseGrade:
-    """Convert a noise section to SI."""
-    return NoiseGrade.from_datasheet(**noise.model_dump(exclude={"grade"}))
-
-
-def _initial_errors(errors: InitialErrors) -> ImuErrors:
-    return ImuErrors(
-        np.array(errors.gyro_bias_deg_s) * DEG,
-        np.array(errors.accel_bias_m_s2),
-        np.array(errors.gyro_scale_ppm) * PPM,
-        np.array(errors.accel_scale_ppm) * PPM,
-    )
-
-
 def initial_std(std: InitialStd, otherwise: ImuErrors) -> ImuErrors:
     """Return in SI how sure the initial errors of an IMU are; `otherwise` has what is not given."""
-
-    def of(given: tuple[float, float, float] | None, unit: float, own: Array) -> Array:
-        return own if given is None else np.array(given) * unit
-
-    return ImuErrors(
-        of(std.gyro_bias_deg_s, DEG, otherwise.gyro_bias),
-        of(std.accel_bias_m_s2, 1.0, otherwise.accel_bias),
-        of(std.gyro_scale_ppm, PPM, otherwise.gyro_scale),
-        of(std.accel_scale_ppm, PPM, otherwise.accel_scale),
-    )
+    known = vars(read(std, ImuErrors))
+    return replace(otherwise, **{name: value for name, value in known.items() if value is not None})

@@ -11,6 +11,7 @@ import numpy as np
 
 from polyins.checks import faults, stream_checks, wheel_checks
 from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_configuration
+from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
 from polyins.model.recording import FilterOptions, ImuStream, Offset, Recording
@@ -69,7 +70,7 @@ def names_of(settings: Sequence[Settings]) -> list[str]:
     for name, (_, document, _) in zip(own, settings, strict=True):
         path = document.path.resolve()
         if Path(name).name != name:
-            raise InputError(f"{document.place(['name'])}: is {name!r}; expected what may be the name of a folder")
+            raise document.error(["name"], f"is {name!r}; expected what may be the name of a folder")
         longer = name if own.count(name) == 1 else f"{path.parent.name}/{name}"
         if longer in names:
             raise InputError(
@@ -97,8 +98,8 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     `wheels_known`: check that wheels turn as declared; what calibrates them needs not know yet.
     """
     notes = wheel_checks.check_settings(config, document)
-    read = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
-    imus, streams, warnings = zip(*read, strict=True)
+    mounted = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
+    imus, streams, warnings = zip(*mounted, strict=True)
     notes += _one_by_kind([text for texts in warnings for text in texts])
     faults.check_alive(streams)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
@@ -142,7 +143,7 @@ def assemble(
         geodetic=bool(geodetic),
         outages=outage_intervals(config, document, span, gnss),
         start=start,
-        options=_filter_options(config),
+        options=read(config.filter, FilterOptions, nonholonomic=constraint_of(config)),
         name=config.name,
         warnings=(*notes, *texts),
         aiding=aiding,
@@ -158,11 +159,13 @@ def without_data(config: Config, document: Document) -> tuple[Recording, tuple[s
     notes = wheel_checks.check_settings(config, document)
     for index, entry in enumerate(config.imus):
         if entry.time_offset:
-            place = document.place(["imus", index, "time_offset"])
-            raise InputError(f"{place}: is found from a whole recording; expected clock_offset_s")
+            raise document.error(
+                ["imus", index, "time_offset"], "is found from a whole recording; expected clock_offset_s"
+            )
     if config.start.heading_from == "reference":
-        place = document.place(["start", "heading_from"])
-        raise InputError(f"{place}: is reference, which live data have not; expected heading_deg or gnss-course")
+        raise document.error(
+            ["start", "heading_from"], "is reference, which live data have not; expected heading_deg or gnss-course"
+        )
     imus = []
     for index, entry in enumerate(config.imus):
         with document.at(["imus", index]):
@@ -171,7 +174,8 @@ def without_data(config: Config, document: Document) -> tuple[Recording, tuple[s
     geodetic = config.gnss is not None and config.gnss.plane_origin is None
     if config.start.position:
         geodetic = config.start.position.geodetic
-    rig, options = _rig(config, document, tuple(imus)), _filter_options(config)
+    rig = _rig(config, document, tuple(imus))
+    options = read(config.filter, FilterOptions, nonholonomic=constraint_of(config))
     recording = Recording(rig, (), geodetic=geodetic, start=start, options=options, name=config.name)
     return recording, (*notes, *texts, *_not_live(config))
 
@@ -194,8 +198,9 @@ def _rig(config: Config, document: Document, imus: tuple[Imu, ...]) -> Rig:
         antenna = np.array(config.gnss.antenna_position_m) if config.gnss else np.zeros(3)
         rig = Rig(imus, antenna, sensors_of(config, document))
     if config.odometer is not None and rig.has_wheels:
-        place = document.place(["odometer"])
-        raise InputError(f"{place}: is given, and an IMU on a wheel, which shows the speed as well; expected one")
+        raise document.error(
+            ["odometer"], "is given, and an IMU on a wheel, which shows the speed as well; expected one"
+        )
     return rig
 
 
@@ -223,18 +228,6 @@ def _one_by_kind(notes: list[str]) -> list[str]:
         f"{found[0]}{f' and {len(found) - 1} files more' if len(found) > 1 else ''}: {text}"
         for text, found in places.items()
     ]
-
-
-def _filter_options(config: Config) -> FilterOptions:
-    return FilterOptions(
-        gate_limit=config.filter.gate_limit,
-        gate_reopen_after=config.filter.gate_reopen_after,
-        gnss_snap=config.filter.gnss_snap_s,
-        gravity=config.filter.gravity_m_s2,
-        rolling=config.filter.rolling.options(),
-        nonholonomic=constraint_of(config),
-        standstill=None if config.filter.standstill is None else config.filter.standstill.options(),
-    )
 
 
 def _one_kind(known: bool | None, new: bool, place: str) -> bool:

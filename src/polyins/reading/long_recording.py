@@ -158,9 +158,8 @@ def _head_end(config: Config, document: Document, extents: Sequence[StreamExtent
             continue
         until = max(until, float(np.max(value)) + AROUND_START_S)
         if (until - span[0]) * rate > MOST_HEAD_ROWS and until < span[1]:
-            place = document.place(["start", key])
             latest = span[0] + MOST_HEAD_ROWS / rate - AROUND_START_S
-            raise InputError(f"{place}: is late in a recording this long; expected at most {latest:.0f} s")
+            raise document.error(["start", key], f"is late in a recording this long; expected at most {latest:.0f} s")
     return until
 
 

@@ -30,8 +30,7 @@ def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) 
     if kind == "auto":
         kind = "table" if entry.columns else track_format(entry.file)
     if entry.columns and kind != "table":
-        place = document.place([section, "columns"])
-        raise InputError(f"{place}: given with format {kind}; expected columns with format table only")
+        raise document.error([section, "columns"], f"given with format {kind}; expected columns with format table only")
     readers = {"kf-gins": kf_gins.read_gnss, "kf-gins-nav": kf_gins.read_nav, "rtklib-pos": rtklib.read_gnss}
     track = readers[kind](entry.file) if kind in readers else table.read_track(entry.file, entry.columns)
     warnings = list(stream_checks.check_track(track, section))
@@ -42,13 +41,15 @@ def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) 
 def _above_ellipsoid(track: Track, entry: GnssEntry | ReferenceEntry, section: str, document: Document) -> Track:
     """Convert heights above the sea, or refuse them."""
     if entry.height == "ellipsoidal" and track.above_sea:
-        place = document.place([section, "height"])
-        raise InputError(f"{place}: heights in {track.source.path} are above the sea; expected height: sea-level")
+        raise document.error(
+            [section, "height"], f"heights in {track.source.path} are above the sea; expected height: sea-level"
+        )
     shift = height_shift(entry, track.geodetic, track.above_sea)
     if shift is None:
-        raise InputError(
-            f"{document.place([section, 'height'])}: sea-level heights need geoid_height_m; expected the height of the "
-            "geoid above the ellipsoid at the place, m"
+        raise document.error(
+            [section, "height"],
+            "sea-level heights need geoid_height_m; expected the height of the geoid above the ellipsoid at the "
+            "place, m",
         )
     return track if shift == 0.0 else replace(track, position=track.position + np.array([0.0, 0.0, shift]))
 
@@ -73,8 +74,7 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
     if entry.position_std_m is not None:
         std = np.tile(entry.position_std_m, (len(track.time), 1))
     if std is None:
-        place = document.place(["gnss"])
-        raise InputError(f"{place}: {track.source.path} has no position std; expected position_std_m")
+        raise document.error(["gnss"], f"{track.source.path} has no position std; expected position_std_m")
     stream_checks.check_std(track.source, std)
     warnings += stream_checks.check_within(track.source, "GNSS", track.time, span)
     track = _converted(track, entry, document)
@@ -98,8 +98,9 @@ def _converted(track: Track, entry: GnssEntry, document: Document) -> Track:
     if origin is None:
         return track
     if not track.geodetic:
-        place = document.place(["gnss", "plane_origin"])
-        raise InputError(f"{place}: given for positions in metres; expected it with latitude and longitude only")
+        raise document.error(
+            ["gnss", "plane_origin"], "given for positions in metres; expected it with latitude and longitude only"
+        )
     return replace(track, position=on_plane(track.position, origin), geodetic=False)
 
 

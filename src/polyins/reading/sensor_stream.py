@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from polyins.checks import stream_checks
-from polyins.config import Config, HeadingEntry, HeightEntry, OdometerEntry, SensorColumns, SensorEntry
+from polyins.config import Config, OdometerEntry, SensorColumns, SensorEntry
+from polyins.config.units import in_si, key_of, read
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.files import find_named
@@ -40,15 +41,8 @@ def sensors_of(config: Config, document: Document) -> tuple[AidingSensor, ...]:
     """Return the sensors as parts of the rig; raises InputError for one that is farther away than any rig is long."""
     found = []
     for kind, entry in entries(config):
-        std, walk = 0.0, 0.0
-        if isinstance(entry, HeightEntry):
-            std, walk = entry.bias_std_m, entry.bias_random_walk_m_sqrt_s
-        elif isinstance(entry, HeadingEntry):
-            std = entry.offset_std_deg * DEG
-        elif isinstance(entry, OdometerEntry):
-            std = entry.scale_std
         with document.at([kind, "position_m"]):
-            found.append(AidingSensor(kind, np.array(entry.position_m), std, walk))
+            found.append(read(entry, AidingSensor, kind=kind))
     return tuple(found)
 
 
@@ -89,8 +83,7 @@ def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tupl
     warnings = stream_checks.check_within(source, kind, time, span)
     given = std_of(entry)
     if given is None and not std:
-        place = document.place([kind])
-        raise InputError(f"{place}: {source.path} has no std; expected a column std or {_std_key(kind)}")
+        raise document.error([kind], f"{source.path} has no std; expected a column std or {key_of(type(entry), 'std')}")
     stds = std[0] * unit if given is None else np.full(len(time), given)
     stream_checks.check_finite(source, {"std": stds})
     for row in np.flatnonzero(stds <= 0.0)[:1]:
@@ -104,22 +97,14 @@ def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorC
     units = UNITS[kind]
     unit: str = columns.unit or next(iter(units))
     if unit not in units:
-        place = document.place([kind, "columns", "unit"])
-        raise InputError(f"{place}: is {unit} for {kind}; expected {' or '.join(units)}")
+        raise document.error([kind, "columns", "unit"], f"is {unit} for {kind}; expected {' or '.join(units)}")
     return columns, units[unit]
 
 
 def std_of(entry: SensorEntry) -> float | None:
     """Return the std of the value that takes the place of what a sensor says, SI."""
-    if isinstance(entry, HeadingEntry):
-        return None if entry.std_deg is None else entry.std_deg * DEG
-    if isinstance(entry, HeightEntry):
-        return entry.std_m
-    return entry.std_m_s if isinstance(entry, OdometerEntry) else None
-
-
-def _std_key(kind: str) -> str:
-    return {"height": "std_m", "heading": "std_deg", "odometer": "std_m_s"}[kind]
+    std: float | None = in_si(entry, key_of(type(entry), "std"))
+    return std
 
 
 def with_constraint(entry: SensorEntry, std: Array) -> Array:

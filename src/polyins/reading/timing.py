@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from polyins.config import Config, OutageSchedule, Start
+from polyins.config import Config, OutageSchedule, StartEntry
+from polyins.config.units import read
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
-from polyins.model.recording import Array, GnssStream, StartOptions
-from polyins.model.rig import DEG
+from polyins.model.recording import GnssStream, StartOptions
 
 Span = tuple[float, float]
 
 
-def start_options(start: Start, document: Document, span: Span) -> tuple[StartOptions, list[str]]:
+def start_options(start: StartEntry, document: Document, span: Span) -> tuple[StartOptions, list[str]]:
     """Convert the start section to SI; returns it and warnings. `span`: of the IMUs, s.
 
     Raises InputError for times outside the data.
@@ -23,48 +23,22 @@ def start_options(start: Start, document: Document, span: Span) -> tuple[StartOp
     if start.end_time_s is not None and start.end_time_s > span[1]:
         place = document.place(["start", "end_time_s"])
         warnings.append(f"{place}: is {start.end_time_s:.3f}; the data end at {span[1]:.3f} s")
-    options = StartOptions(
-        time=start.time_s,
-        end_time=start.end_time_s,
-        position=_start_position(start),
-        velocity=_array(start.velocity_m_s),
-        roll_pitch=_array(start.roll_pitch_deg, DEG),
-        heading=None if start.heading_deg is None else start.heading_deg * DEG,
-        heading_from=start.heading_from,
-        static_interval=start.static_interval_s,
-        position_std=_array(start.position_std_m),
-        velocity_std=_array(start.velocity_std_m_s),
-        attitude_std=_array(start.attitude_std_deg, DEG),
-        estimate_gyro_bias=start.estimate_gyro_bias,
-    )
-    return options, warnings
+    position = start.position and start.position.coordinates()
+    return read(start, StartOptions, position=position), warnings
 
 
-def _check_times(start: Start, document: Document, span: Span) -> None:
+def _check_times(start: StartEntry, document: Document, span: Span) -> None:
     covered = f"within the data, {span[0]:.3f} to {span[1]:.3f} s"
     begin = span[0] if start.time_s is None else start.time_s
     still = start.static_interval_s
     if not span[0] <= begin < span[1]:
-        raise InputError(f"{document.place(['start', 'time_s'])}: is {begin:.3f}; expected a time {covered}")
+        raise document.error(["start", "time_s"], f"is {begin:.3f}; expected a time {covered}")
     if start.end_time_s is not None and start.end_time_s <= begin:
-        place = document.place(["start", "end_time_s"])
-        raise InputError(f"{place}: is {start.end_time_s:.3f}; expected a time after the start, {begin:.3f} s")
+        raise document.error(
+            ["start", "end_time_s"], f"is {start.end_time_s:.3f}; expected a time after the start, {begin:.3f} s"
+        )
     if still is not None and not span[0] <= still[0] < still[1] <= span[1]:
-        place = document.place(["start", "static_interval_s"])
-        raise InputError(f"{place}: is {list(still)}; expected [from, to] {covered}")
-
-
-def _start_position(start: Start) -> Array | None:
-    position = start.position
-    if position is None:
-        return None
-    if position.latitude_deg is not None and position.longitude_deg is not None:
-        return np.array([position.latitude_deg * DEG, position.longitude_deg * DEG, position.height_m])
-    return np.array([position.north_m, position.east_m, position.height_m], dtype=float)
-
-
-def _array(values: tuple[float, ...] | None, unit: float = 1.0) -> Array | None:
-    return None if values is None else np.array(values) * unit
+        raise document.error(["start", "static_interval_s"], f"is {list(still)}; expected [from, to] {covered}")
 
 
 def outage_intervals(config: Config, document: Document, span: Span, gnss: GnssStream | None) -> tuple[Span, ...]:
@@ -72,40 +46,40 @@ def outage_intervals(config: Config, document: Document, span: Span, gnss: GnssS
 
     Raises InputError for outages without GNSS, outside the data, overlapping, or that end before they begin.
     """
-    place = document.place(["outages"])
     if not config.outages:
         return ()
-    if gnss is None:
-        raise InputError(f"{place}: given without gnss; expected both or neither")
-    if isinstance(config.outages, OutageSchedule):
-        first_fix = float(gnss.time[gnss.time >= span[0]][0])
-        begin = first_fix if config.start.time_s is None else config.start.time_s
-        end = min(span[1], float(gnss.time[-1]), np.inf if config.start.end_time_s is None else config.start.end_time_s)
-        return _scheduled(config.outages, begin, end, place)
-    outages = sorted(config.outages)
-    _check_outages(outages, place, span)
+    with document.at(["outages"]):
+        if gnss is None:
+            raise InputError("given without gnss; expected both or neither")
+        if isinstance(config.outages, OutageSchedule):
+            first_fix = float(gnss.time[gnss.time >= span[0]][0])
+            begin = first_fix if config.start.time_s is None else config.start.time_s
+            end_time = np.inf if config.start.end_time_s is None else config.start.end_time_s
+            return _scheduled(config.outages, begin, min(span[1], float(gnss.time[-1]), end_time))
+        outages = sorted(config.outages)
+        _check_outages(outages, span)
     return tuple(outages)
 
 
-def _check_outages(outages: list[Span], place: str, span: Span) -> None:
+def _check_outages(outages: list[Span], span: Span) -> None:
     """`outages` is in order of time."""
     covered = f"within the data, {span[0]:.3f} to {span[1]:.3f} s"
     previous_end = -np.inf
     for a, b in outages:
         if not a < b:
-            raise InputError(f"{place}: [{a:g}, {b:g}] ends before it begins; expected [from, to]")
+            raise InputError(f"[{a:g}, {b:g}] ends before it begins; expected [from, to]")
         if a < span[0] or b > span[1]:
-            raise InputError(f"{place}: [{a:g}, {b:g}] is outside the data; expected times {covered}")
+            raise InputError(f"[{a:g}, {b:g}] is outside the data; expected times {covered}")
         if a < previous_end:
-            raise InputError(f"{place}: [{a:g}, {b:g}] overlaps the outage before; expected outages apart")
+            raise InputError(f"[{a:g}, {b:g}] overlaps the outage before; expected outages apart")
         previous_end = b
 
 
-def _scheduled(schedule: OutageSchedule, begin: float, end: float, place: str) -> tuple[Span, ...]:
+def _scheduled(schedule: OutageSchedule, begin: float, end: float) -> tuple[Span, ...]:
     outages = schedule.intervals(begin, end)
     if not outages:
         raise InputError(
-            f"{place}: no outage of {schedule.length_s:g} s fits after {schedule.first_begin(begin):.3f} s; "
-            f"expected it to end with the data, at {end:.3f} s"
+            f"no outage of {schedule.length_s:g} s fits after {schedule.first_begin(begin):.3f} s; expected it to end "
+            f"with the data, at {end:.3f} s"
         )
     return outages

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +13,9 @@ from pydantic import Field, model_validator
 from polyins.checks.stream_checks import check_std, check_track
 from polyins.config import NotNegative, Number, Positive, PositiveSpread, Section
 from polyins.config.fields import blame
+from polyins.config.units import read
 from polyins.errors import InputError
 from polyins.formats.rows import Track
-from polyins.model.rig import DEG
 from polyins.reading.guess import read_stream
 from polyins.simulation.path import Driving, Path, World, drive
 from polyins.simulation.replay import Ride, replay
@@ -31,6 +32,11 @@ RTK_STD_M = (0.02, 0.02, 0.04)
 class Drive(Section):
     """A drive of its own, which a seed draws: every 4 to 9 s another speed and mostly a turn, at times a stop."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {
+        "slope": "slope_std",
+        "camber": "camber_std",
+        "roll": "roll_per_acceleration",
+    }
     top_speed_m_s: Positive = 16.0
     """m/s; a robot's is about 2"""
     acceleration_m_s2: Brisk = 2.0
@@ -52,22 +58,18 @@ class Drive(Section):
         self, duration: float, static: float, seed: np.random.SeedSequence, start: ArrayLike, world: World
     ) -> Path:
         """Return the path."""
-        driving = Driving(
-            top_speed=self.top_speed_m_s,
-            acceleration=self.acceleration_m_s2,
-            lateral_acceleration=self.lateral_acceleration_m_s2,
-            turn_radius=self.turn_radius_m,
-            slope_std=self.slope_deg * DEG,
-            steepest=self.steepest_deg * DEG,
-            camber_std=self.camber_deg * DEG,
-            roll_per_acceleration=self.roll_deg_per_m_s2 * DEG,
-        )
+        driving = read(self, Driving)
         return drive(duration, static=static, seed=seed, start=start, driving=driving, world=world)
 
 
-class Replay(Section):
+class ReplayedDrive(Section):
     """Positions of a drive, as RTK gives them: speed, course and slope follow; the rest is said here."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {
+        "camber": "camber_std",
+        "roll": "roll_per_acceleration",
+        "pitch": "pitch_per_acceleration",
+    }
     file: str
     """positions of what becomes the array origin: a receiver's, or a table of time, latitude, longitude, height"""
     from_s: Number | None = None
@@ -106,7 +108,7 @@ class Replay(Section):
         if track.position_std is not None and self.position_std_m is None:
             check_std(track.source, track.position_std)
             std = track.position_std
-        path = replay(track.time, track.position, std, ride=self._ride(), seed=seed)
+        path = replay(track.time, track.position, std, ride=read(self, Ride), seed=seed)
         return replace(path, warnings=(*guesses, *outside, *warnings))
 
     def _part(self, track: Track) -> tuple[Track, tuple[str, ...]]:
@@ -123,13 +125,3 @@ class Replay(Section):
         early, late = np.isfinite(begin) and begin < first, np.isfinite(end) and end > last
         warning = f"replay: from_s or to_s is outside of what there is; {covers}"
         return track.at_rows(used), (warning,) if early or late else ()
-
-    def _ride(self) -> Ride:
-        return Ride(
-            camber_std=self.camber_deg * DEG,
-            camber_length=self.camber_length_m,
-            slope_smoothing=self.slope_smoothing_m,
-            roll_per_acceleration=self.roll_deg_per_m_s2 * DEG,
-            pitch_per_acceleration=self.pitch_deg_per_m_s2 * DEG,
-            side_slip=self.side_slip_deg_per_m_s2 * DEG,
-        )

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from polyins.config import NotNegative, Number, Section, Triple
-from polyins.model.rig import DEG, HOUR, MGAL, ImuErrors, NoiseGrade
-from polyins.simulation.force_response import STANDARD_GRAVITY
+from polyins.config.units import in_si, read
+from polyins.model.rig import ImuErrors, NoiseGrade
 from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.shared_noise import SharedNoise
-from polyins.simulation.triads import Calibration, Chip
+from polyins.simulation.triads import Chip, TriadCalibration
 
 Array = NDArray[np.float64]
 
@@ -41,13 +42,31 @@ class ChipCalibration(Section):
     def chip(self) -> Chip:
         """Return the same in SI."""
         return Chip(
-            Calibration(np.array(self.gyro_matrix), np.array(self.gyro_offset_deg_s) * DEG),
-            Calibration(np.array(self.accel_matrix), np.array(self.accel_offset_m_s2)),
+            TriadCalibration(np.array(self.gyro_matrix), in_si(self, "gyro_offset_deg_s")),
+            TriadCalibration(np.array(self.accel_matrix), in_si(self, "accel_offset_m_s2")),
         )
 
 
-class Errors(Section):
+class SensorErrors(Section):
     """Which errors the IMUs have, beyond the statistics under `noise`."""
+
+    FIELDS: ClassVar[Mapping[str, str]] = {
+        "rectification": "rectification_mean",
+        "rectification_spread": "rectification_std",
+        **{
+            name: f"{name}_std"
+            for name in (
+                "misalignment",
+                "gyro_turn_on",
+                "accel_turn_on",
+                "chip_rotation",
+                "gyro_skew",
+                "accel_skew",
+                "g_sensitivity",
+                "jitter",
+            )
+        },
+    }
 
     noise: bool = True
     """white noise"""
@@ -96,31 +115,11 @@ class Errors(Section):
 
     def imperfections(self) -> Imperfections:
         """Return the same in SI."""
-        return Imperfections(
-            turn_on_share=self.turn_on_share,
-            misalignment_std=self.misalignment_deg * DEG,
-            noise=self.noise,
-            biases=self.biases,
-            scales=self.scales,
-            gyro_turn_on_std=self.gyro_turn_on_deg_h * DEG / HOUR,
-            accel_turn_on_std=self.accel_turn_on_mgal * MGAL,
-            chip_rotation_std=self.chip_rotation_deg * DEG,
-            gyro_skew_std=self.gyro_skew_deg * DEG,
-            accel_skew_std=self.accel_skew_deg * DEG,
-            gyro_random_walk=self.gyro_random_walk_deg_h_sqrt_h * DEG / HOUR**1.5,
-            accel_random_walk=self.accel_random_walk_mgal_sqrt_h * MGAL / HOUR**0.5,
-            g_sensitivity_std=self.g_sensitivity_deg_s_g * DEG / STANDARD_GRAVITY,
-            rectification_mean=self.rectification_mg_g2 * 1e-3 / STANDARD_GRAVITY,
-            rectification_std=self.rectification_spread_mg_g2 * 1e-3 / STANDARD_GRAVITY,
-            jitter_std=self.jitter_s,
-            gyro_lsb=self.gyro_lsb_deg_s * DEG,
-            accel_lsb=self.accel_lsb_mg * 1e-3 * STANDARD_GRAVITY,
-            chips=tuple(entry.chip() for entry in self.chips),
-        )
+        return read(self, Imperfections, chips=tuple(entry.chip() for entry in self.chips))
 
     def start_std(self, grade: NoiseGrade) -> ImuErrors | None:
         """Return how large the slow errors may be at the start; None: as large as those of the grade."""
-        gyro, accel = self.gyro_turn_on_deg_h * DEG / HOUR, self.accel_turn_on_mgal * MGAL
+        gyro, accel = in_si(self, "gyro_turn_on_deg_h"), in_si(self, "accel_turn_on_mgal")
         if gyro == accel == 0.0:
             return None
         return ImuErrors(

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Ruler:
+class FlexibleMount:
     """A ruler as it is mounted, and how it really vibrates."""
 
     beam: Cantilever
@@ -51,7 +51,7 @@ class Ruler:
         return self.tuning * self.beam.bending_rate
 
 
-def flex(ruler: Ruler, shaking: Shaking, gravity: float) -> Array:
+def flex(ruler: FlexibleMount, shaking: Shaking, gravity: float) -> Array:
     """Return bend, m, twist, rad, and their derivatives, shape (T, 4), of a ruler on a body that shakes.
 
     Seen from outside, the tip is a mass on a spring whose foot is the clamp: the deflection is what it lags behind.
@@ -71,7 +71,7 @@ def flex(ruler: Ruler, shaking: Shaking, gravity: float) -> Array:
     return flexing
 
 
-def foot_of(ruler: Ruler) -> Array:
+def foot_of(ruler: FlexibleMount) -> Array:
     """Return by how much heave, pitch and roll of the body move the foot of the bending mode, shape (3,)."""
     beam = ruler.beam
     clamp = ruler.tip[1] - ruler.side * beam.length
@@ -117,7 +117,7 @@ def tip_motion(motion: Array, change: Array, flexing: Array, shape: Array, moved
     moved[17] = cp * z_rate - sp * x_rate - pitching * (sp * z + cp * x) + rise
 
 
-def shape_of(ruler: Ruler) -> Array:
+def shape_of(ruler: FlexibleMount) -> Array:
     """Return what `tip_motion` has to know of a ruler: its tip, slope and shortening, and the module's height, (6,)."""
     beam, side = ruler.beam, ruler.side
     bending = (side * beam.slope / beam.length, side * beam.shortening / beam.length)

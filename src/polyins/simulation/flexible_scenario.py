@@ -14,9 +14,9 @@ from polyins.config import NotNegative, Number, Pair, Positive, Section, Triple
 from polyins.config.fields import blame
 from polyins.model.rig import DEG
 from polyins.simulation.cantilever import Cantilever
-from polyins.simulation.flexible import Ruler
+from polyins.simulation.flexible import FlexibleMount
 from polyins.simulation.path import Path, World
-from polyins.simulation.road import Bump, Ground, Roughness, Wheel, ground
+from polyins.simulation.road import Bump, Ground, Roughness, WheelContact, ground
 from polyins.simulation.shaking import way
 from polyins.simulation.shuttle import Way, shuttle_path
 from polyins.simulation.tyres import Suspension
@@ -76,7 +76,7 @@ class Arm(Section):
         return -1.0 if self.tip_m[1] < 0.0 else 1.0
 
 
-class Rulers(Section):
+class FlexibleMounts(Section):
     """IMUs at the tips of steel rulers."""
 
     arms: Annotated[tuple[Arm, ...], Field(min_length=1)]
@@ -106,13 +106,13 @@ class Rulers(Section):
     stiff: bool = False
     """the rulers neither bend nor twist: a rigid array of the same geometry"""
 
-    def rulers(self, rng: np.random.Generator | None = None) -> list[Ruler]:
+    def mounts(self, rng: np.random.Generator | None = None) -> list[FlexibleMount]:
         """Return the rulers; without a generator as they are meant to be."""
         places = sorted({arm.tip_m[0] for arm in self.arms})
         shift = dict(zip(places, rng.choice([-1.0, 1.0], len(places)) if rng else np.zeros(len(places)), strict=True))
         drawn = rng.uniform(-1.0, 1.0, len(self.arms)) if rng else np.zeros(len(self.arms))
         return [
-            Ruler(
+            FlexibleMount(
                 self.beam(arm.free_length_m),
                 np.array(arm.tip_m),
                 arm.side,
@@ -241,7 +241,7 @@ class Road(Section):
             for book in books
         ]
         length = float(way(path, np.linspace(0.0, path.duration, int(path.duration * 100.0) + 1))[-1])
-        return ground(length, roughness, bumps, Wheel(self.wheel_radius_m, self.envelope_m), rng)
+        return ground(length, roughness, bumps, WheelContact(self.wheel_radius_m, self.envelope_m), rng)
 
     def _shuffled(self, rng: np.random.Generator) -> tuple[Book, ...]:
         """Return the books, each at the place of another one and under the wheels of a third one."""

@@ -16,8 +16,6 @@ from polyins.simulation.triads import product
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665  # m/s^2
-
 
 @dataclass(frozen=True)
 class ForceResponse:

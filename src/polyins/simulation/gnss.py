@@ -51,7 +51,7 @@ def fixes(
     return replace(stream, velocity=velocity, velocity_std=velocity_std)
 
 
-def with_lies(
+def with_wrong_fixes(
     stream: GnssStream,
     among: NDArray[np.intp],
     count: int,

@@ -14,11 +14,13 @@ The integrals are Simpson's over the samples of the motion.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.kernels.jit import kernel
-from polyins.simulation.flexible import Ruler, shape_of, tip_motion
+from polyins.simulation.flexible import FlexibleMount, shape_of, tip_motion
 from polyins.simulation.increments import rates
 from polyins.simulation.path import Path
 from polyins.simulation.shaking import Shaking
@@ -59,33 +61,44 @@ def smooth_rates(path: Path, count: int, interval: float) -> Array:
     return np.vstack(parts)
 
 
-def moving_increments(smooth: Array, ruler: Ruler, flexing: Array, shaking: Shaking) -> tuple[Array, Array]:
+class _Tip(NamedTuple):
+    """How the tip of a mount moves."""
+
+    motion: Array
+    """of the body, as in `Shaking`"""
+    change: Array
+    flexing: Array
+    """from `flex`"""
+    shape: Array
+    """from `shape_of`"""
+
+
+class _Samples(NamedTuple):
+    """What is worked out at the samples of an interval."""
+
+    cubic: Array
+    """from `interpolation`"""
+    weights: Array
+    """from `simpson`"""
+
+
+def moving_increments(smooth: Array, ruler: FlexibleMount, flexing: Array, shaking: Shaking) -> tuple[Array, Array]:
     """Return (dtheta, dvel), shape (T, 3) each, of an IMU in its own axes.
 
     `smooth` is from `smooth_rates`, `flexing` from `flex`.
     """
     increments = np.empty((len(smooth) - 3, 6))
-    cubic, weights = interpolation(), simpson(shaking.step)
-    _integrate(
-        smooth, shaking.motion, shaking.change, flexing, shape_of(ruler), cubic, weights, np.empty(42), increments
-    )
+    tip = _Tip(shaking.motion, shaking.change, flexing, shape_of(ruler))
+    _integrate(smooth, tip, _Samples(interpolation(), simpson(shaking.step)), np.empty(42), increments)
     return increments[:, :3].copy(), increments[:, 3:].copy()
 
 
 @kernel
-def _integrate(
-    smooth: Array,
-    motion: Array,
-    change: Array,
-    flexing: Array,
-    shape: Array,
-    cubic: Array,
-    weights: Array,
-    scratch: Array,
-    increments: Array,
-) -> None:
+def _integrate(smooth: Array, tip: _Tip, samples: _Samples, scratch: Array, increments: Array) -> None:
     """Write dtheta and dvel of each interval."""
     rates_now, moved, seen, felt = scratch[:15], scratch[15:33], scratch[33:36], scratch[36:42]
+    motion, change, flexing, shape = tip
+    cubic, weights = samples
     for k in range(len(increments)):
         total = increments[k]
         for i in range(6):

@@ -76,7 +76,7 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """Position, attitude and rates of the body at some instants."""
 
     position: Array
@@ -138,7 +138,7 @@ class Path:
             attitude=attitude,
         )
 
-    def motion(self, time: Array) -> Motion:
+    def motion(self, time: Array) -> BodyMotion:
         """Return position, velocity, attitude and rates of the array origin at times, shape (T,)."""
         attitude = np.column_stack([self.roll(time), self.pitch(time), self.heading(time)])
         C_nb = np.ascontiguousarray(rotation_matrices(quaternions(attitude)))
@@ -147,7 +147,7 @@ class Path:
         earth_rate = self.world.earth_rate(position)
         level_rate = _to_body(C_nb, earth_rate + self.world.transport_rate(position, velocity))
         angular_rate = level_rate + self._body_rate(time, attitude)
-        return Motion(position, velocity, attitude, C_nb, _to_body(C_nb, earth_rate), angular_rate)
+        return BodyMotion(position, velocity, attitude, C_nb, _to_body(C_nb, earth_rate), angular_rate)
 
     def body_velocity(self, time: Array, nu: int = 0) -> Array:
         """Return the velocity along the body's axes, m/s, or a derivative of it, at times, shape (T, 3)."""

@@ -58,7 +58,7 @@ class Bump:
 
 
 @dataclass(frozen=True)
-class Wheel:
+class WheelContact:
     """What of a wheel decides how it meets the ground."""
 
     radius: float
@@ -80,7 +80,7 @@ class Ground:
 
 
 def ground(
-    length: float, roughness: Roughness, bumps: Sequence[Bump], wheel: Wheel, rng: np.random.Generator
+    length: float, roughness: Roughness, bumps: Sequence[Bump], wheel: WheelContact, rng: np.random.Generator
 ) -> Ground:
     """Draw the ground along a way of a length, m, as a wheel meets it."""
     from scipy.interpolate import CubicSpline

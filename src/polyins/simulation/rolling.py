@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polyins.simulation.path import Curve, Motion, Path
+from polyins.simulation.path import BodyMotion, Curve, Path
 
 Array = NDArray[np.float64]
 
@@ -40,18 +40,18 @@ class RollingWheel:
     slip: Curve | None = None
     """by which share the wheel turns more than it rolls"""
 
-    def speed(self, motion: Motion, time: Array) -> Array:
+    def speed(self, motion: BodyMotion, time: Array) -> Array:
         """Return the forward speed of the wheel's centre in v, m/s, shape (T,); `motion` is the path's at the times."""
         turning = motion.angular_rate - motion.earth_rate
         return np.asarray(self.path.speed(time) + np.cross(turning, self.centre)[:, 0])
 
-    def spin(self, motion: Motion, time: Array) -> Array:
+    def spin(self, motion: BodyMotion, time: Array) -> Array:
         """Return the rate of the module against the vehicle about x, rad/s, shape (T,)."""
         slip = 0.0 if self.slip is None else self.slip(time)
         turning = motion.angular_rate - motion.earth_rate
         return np.asarray(-self.speed(motion, time) * (1.0 + slip) / self.radius - turning[:, 1])
 
-    def motion(self, time: ArrayLike, lever_arm: ArrayLike = (0.0, 0.0, 0.0)) -> Motion:
+    def motion(self, time: ArrayLike, lever_arm: ArrayLike = (0.0, 0.0, 0.0)) -> BodyMotion:
         """Return the true motion of an IMU on the wheel, in module axes, at times, shape (T,).
 
         `lever_arm` leads from the IMU to the wheel's centre, m, module axes, shape (3,).
@@ -69,7 +69,7 @@ class RollingWheel:
         # local level turns by 1.6e-7 rad per metre: first order is exact
         level = self.path.world.transport_rate(vehicle.position, arm)
         C_nb = C_nb - np.cross(level[:, None, :], C_nb.swapaxes(1, 2)).swapaxes(1, 2)
-        return Motion(
+        return BodyMotion(
             position=vehicle.position + self.path.world.displacement(vehicle.position, arm),
             velocity=velocity - np.cross(level, velocity),
             attitude=_euler_angles(C_nb),

@@ -12,11 +12,19 @@ from pathlib import Path as FilePath
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.config.units import read
 from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
-from polyins.model.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
-from polyins.model.rig import DEG, Imu
-from polyins.reading.imu_stream import noise_grade
+from polyins.model.recording import (
+    FilterOptions,
+    GnssStream,
+    ImuStream,
+    Recording,
+    Reference,
+    RollingOptions,
+    StartOptions,
+)
+from polyins.model.rig import DEG, Imu, NoiseGrade
 from polyins.simulation import gnss
 from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Road
@@ -75,7 +83,7 @@ class Simulation:
     path: Path
     errors: tuple[TrueErrors, ...]
     """in the order of the rig's IMUs"""
-    lies: NDArray[np.intp]
+    wrong_fixes: NDArray[np.intp]
     """indices of the fixes that are wrong"""
     wheels: tuple[RollingWheel, ...] = ()
     """in the order of the scenario's"""
@@ -101,14 +109,14 @@ def true_run(scenario: Scenario) -> TrueRun:
         wheels,
         tuple(wheel_increments(wheel, scenario.rate_hz) for wheel in wheels),
     )
-    return _on_rulers(run, np.random.default_rng(ground_seed)) if scenario.rulers else run
+    return _on_flexible_mounts(run, np.random.default_rng(ground_seed)) if scenario.rulers else run
 
 
-def _on_rulers(run: TrueRun, rng: np.random.Generator) -> TrueRun:
+def _on_flexible_mounts(run: TrueRun, rng: np.random.Generator) -> TrueRun:
     """Return a run whose body shakes on its road, and whose IMUs are at the tips of rulers."""
     scenario, path, interval = run.scenario, run.path, 1.0 / run.scenario.rate_hz
     assert scenario.rulers is not None
-    rulers = scenario.rulers.rulers(rng)
+    rulers = scenario.rulers.mounts(rng)
     road = scenario.road or Road()
     begins = scenario.shuttle.straights(path.duration, scenario.static_s)[1] if scenario.shuttle else ()
     shaking = shake(path, road.ground(path, begins, rng), road.suspension(), interval / FINE_STEPS)
@@ -155,7 +163,7 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
     imus, streams, errors = zip(*sensed, strict=True)
     lacks_outages = bool(scenario.gnss and scenario.outages) and not scenario.outage_intervals()
     too_short = ("outages: the drive is too short for one",) if lacks_outages else ()
-    fixes, lies = _receive(scenario, run.path, np.random.default_rng(gnss_seed))
+    fixes, wrong_fixes = _receive(scenario, run.path, np.random.default_rng(gnss_seed))
     recording = Recording(
         rig=replace(rig, imus=imus),
         imus=streams,
@@ -164,12 +172,12 @@ def record(run: TrueRun, *, seed: int) -> Simulation:
         geodetic=scenario.earth == "turning",
         outages=scenario.outage_intervals(),
         start=_start(scenario, run),
-        options=FilterOptions(gravity=scenario.gravity_m_s2, rolling=scenario.rolling.options()),
+        options=FilterOptions(gravity=scenario.gravity_m_s2, rolling=read(scenario.rolling, RollingOptions)),
         name=scenario.name,
         warnings=(*run.path.warnings, *scenario.without_effect(), *too_short),
         config_text=write_yaml(scenario.model_dump(mode="json")),
     )
-    return Simulation(recording, run.path, errors, lies, run.wheels)
+    return Simulation(recording, run.path, errors, wrong_fixes, run.wheels)
 
 
 def checked(seed: int) -> int:
@@ -216,7 +224,7 @@ def _sense(
 ) -> tuple[Imu, ImuStream, TrueErrors]:
     """Return an IMU as it is configured, what it puts out, turned into array axes as a reader does, and its errors."""
     scenario, time = run.scenario, run.time
-    imperfections, grade = scenario.errors.imperfections(), noise_grade(scenario.noise)
+    imperfections, grade = scenario.errors.imperfections(), read(scenario.noise, NoiseGrade)
     dtheta, dvel = run.sensed(imu)
     errors = draw_errors(time[-1], grade, imperfections, rng, shared=shared, number=number)
     dtheta, dvel = corrupt(
@@ -271,7 +279,7 @@ def _start(scenario: Scenario, run: TrueRun) -> StartOptions:
 
 
 def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[GnssStream | None, NDArray[np.intp]]:
-    """Return the fixes and the indices of the lies among them."""
+    """Return the fixes and the indices of the wrong ones among them."""
     if scenario.gnss is None:
         return None, np.zeros(0, dtype=np.intp)
     receiver = scenario.gnss
@@ -290,7 +298,9 @@ def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[
     shown = stream.time > scenario.static_s
     for begin, end in scenario.outage_intervals():
         shown &= (stream.time < begin) | (stream.time > end)
-    return gnss.with_lies(stream, np.flatnonzero(shown), receiver.lies.count, receiver.lies.size_m, rng, path.world)
+    return gnss.with_wrong_fixes(
+        stream, np.flatnonzero(shown), receiver.lies.count, receiver.lies.size_m, rng, path.world
+    )
 
 
 def _reference(path: Path, rate_hz: float) -> Reference:

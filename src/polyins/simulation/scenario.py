@@ -27,18 +27,19 @@ from polyins.config import (
     validated,
 )
 from polyins.config.fields import blame
+from polyins.config.units import read
 from polyins.config.yaml_document import read_yaml
 from polyins.model.axes import axes_matrix
 from polyins.model.recording import FilterOptions
-from polyins.model.rig import DEG, Imu, Rig
-from polyins.reading.imu_stream import initial_std, noise_grade
+from polyins.model.rig import Imu, NoiseGrade, Rig
+from polyins.reading.imu_stream import initial_std
 from polyins.simulation import earth
-from polyins.simulation.drive_scenario import Drive, Replay
-from polyins.simulation.error_scenario import Errors as Errors
-from polyins.simulation.flexible_scenario import Road, Rulers, Shuttle
+from polyins.simulation.drive_scenario import Drive, ReplayedDrive
+from polyins.simulation.error_scenario import SensorErrors as SensorErrors
+from polyins.simulation.flexible_scenario import FlexibleMounts, Road, Shuttle
 from polyins.simulation.path import START, World
 from polyins.simulation.plane import Plane
-from polyins.simulation.wheel_scenario import Laps, Track, WheelModule
+from polyins.simulation.wheel_scenario import Laps, SurveyedTrack, WheelModule
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ class Board(Section):
         return axes_matrix(self.mounts[index % len(self.mounts)])
 
 
-class Lies(Section):
+class WrongFixes(Section):
     """Fixes that are wrong by much more than they claim, outside of outages, while driving."""
 
     count: Annotated[int, Field(ge=0, strict=True)] = 0
@@ -102,7 +103,7 @@ class Fixes(Section):
     """what the fixes claim, north, east, down, m; without it the white noise's"""
     velocity_std_m_s: Spread | None = None
     """of the velocity's noise, north, east, down, m/s; without it there are no velocities"""
-    lies: Lies = Lies()
+    lies: WrongFixes = WrongFixes()
     """wrong fixes"""
 
 
@@ -140,11 +141,11 @@ class Scenario(Section):
     """how it is driven, and over which roads, where no track or laps or replay or shuttle is given"""
     start_std: StartStd = StartStd()
     """of the start that the truth gives where there are wheels and no receiver"""
-    track: Track | None = None
+    track: SurveyedTrack | None = None
     """a surveyed track instead of a drive"""
     laps: Laps | None = None
     """laps of a rectangle instead of a drive; they are driven to their end unless duration_s is given"""
-    replay: Replay | None = None
+    replay: ReplayedDrive | None = None
     """a surveyed drive, driven again, instead of one of its own; its length and its standing start are its own"""
     shuttle: Shuttle | None = None
     """to and fro on straights instead of a drive"""
@@ -152,7 +153,7 @@ class Scenario(Section):
     """of the IMUs"""
     imus: Board = Board()
     """how many and where"""
-    rulers: Rulers | None = None
+    rulers: FlexibleMounts | None = None
     """flexible mounts instead of the board under imus"""
     road: Road | None = None
     """the ground that shakes the rulers; without it they are at rest"""
@@ -166,7 +167,7 @@ class Scenario(Section):
     """how far off they may be at the start, as `initial_std` of a configuration; the rest is as noise and errors say"""
     rolling: Rolling = Rolling()
     """how wheels aid the filter, as the configuration has it under filter.rolling"""
-    errors: Errors = Errors()
+    errors: SensorErrors = SensorErrors()
     """which errors they have"""
     gnss: Fixes | None = Fixes()
     """the receiver; null: none"""
@@ -260,20 +261,17 @@ class Scenario(Section):
 
     def start_position(self) -> Array:
         """Return where the path starts, in the world's coordinates, shape (3,)."""
-        place = self.start
-        if place is None:
-            return np.array(START) if self.earth == "turning" else np.zeros(3)
-        if place.geodetic:
-            return np.array([place.latitude_deg, place.longitude_deg, place.height_m], dtype=float) * [DEG, DEG, 1.0]
-        return np.array([place.north_m, place.east_m, place.height_m], dtype=float)
+        if self.start is not None:
+            return self.start.coordinates()
+        return np.array(START) if self.earth == "turning" else np.zeros(3)
 
     def rig(self) -> Rig:
         """Return what is mounted where: the IMUs on the body, then those on the wheels."""
-        grade = noise_grade(self.filter_noise or self.noise)
+        grade = read(self.filter_noise or self.noise, NoiseGrade)
         name = "body" if self.wheels else "imu"
         module = "body" if self.wheels and self.imus.pitch_m == 0.0 else ""
         if self.rulers:
-            imus = [Imu(f"imu{k}", grade, position=ruler.nominal) for k, ruler in enumerate(self.rulers.rulers(), 1)]
+            imus = [Imu(f"imu{k}", grade, position=ruler.nominal) for k, ruler in enumerate(self.rulers.mounts(), 1)]
         else:
             imus = [
                 Imu(f"{name}{index + 1}", grade, self.imus.rotation(index), position, module=module)
@@ -304,7 +302,7 @@ def demo() -> Scenario:
         name="demo",
         duration_s=360.0,
         static_s=40.0,
-        errors=Errors(turn_on_share=0.5, misalignment_deg=0.05),
+        errors=SensorErrors(turn_on_share=0.5, misalignment_deg=0.05),
         outages=OutageSchedule(length_s=30.0, every_s=75.0, first_after_s=60.0),
     )
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.simulation.path import Motion, Path
+from polyins.simulation.path import BodyMotion, Path
 from polyins.simulation.road import Ground
 from polyins.simulation.tyres import Suspension, bounce
 
@@ -68,7 +68,7 @@ class ShakenPath(Path):
 
     shaking: Shaking | None = None
 
-    def motion(self, time: Array) -> Motion:
+    def motion(self, time: Array) -> BodyMotion:
         """Return position, velocity, attitude and rates of the array origin at times, shape (T,)."""
         smooth = super().motion(time)
         assert self.shaking is not None
@@ -82,7 +82,7 @@ class ShakenPath(Path):
         moving = np.cross(relative, offset) + np.column_stack([none, none, rise])
         shift, velocity = ((smooth.C_nb @ vector[..., None])[..., 0] for vector in (offset, moving))
         own = np.column_stack([rolling, pitching * np.cos(roll), -pitching * np.sin(roll)])
-        return Motion(
+        return BodyMotion(
             smooth.position + self.world.displacement(smooth.position, shift),
             smooth.velocity + velocity,
             _euler(C_nb, smooth.attitude[:, 2]),
@@ -109,8 +109,8 @@ def to_frame(C: Array, vector: Array) -> Array:
     return np.asarray(np.einsum("tji,tj->ti", C, vector))
 
 
-def _euler(C_nb: Array, near: Array) -> Array:
-    """Return roll, pitch, heading of matrices, rad; the heading is the one next to `near`."""
+def _euler(C_nb: Array, smooth: Array) -> Array:
+    """Return roll, pitch, heading of matrices, rad; the heading is the one next to `smooth`."""
     heading = np.arctan2(C_nb[:, 1, 0], C_nb[:, 0, 0])
-    heading += 2.0 * np.pi * np.rint((near - heading) / (2.0 * np.pi))
+    heading += 2.0 * np.pi * np.rint((smooth - heading) / (2.0 * np.pi))
     return np.column_stack([np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]), -np.arcsin(C_nb[:, 2, 0]), heading])

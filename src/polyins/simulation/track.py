@@ -40,7 +40,7 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Course:
+class TrackHeading:
     """The heading as a function of the way travelled."""
 
     heading: Curve
@@ -116,7 +116,7 @@ def track_path(
     duration = float(np.ceil(static + times[-1] - times[0] + 2.0 * reach + rest))
     pace = _smooth_speed(times - times[0] + static + reach, speeds, step, duration)
     pace.c = pace.c * (length / float(pace.integrate(0.0, duration)))
-    course = Course(heading, pace.antiderivative())
+    course = TrackHeading(heading, pace.antiderivative())
     slope = Waves(course.distance, steepest, wave) if steepest else Level()
     return path(pace, Level(), slope, course, duration=duration, static=static, start=start, world=world)
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Calibration:
+class TriadCalibration:
     """What a calibration found of one triad: corrected = matrix @ raw + offset."""
 
     matrix: Array = field(default_factory=lambda: np.eye(3))
@@ -41,8 +41,8 @@ class Calibration:
 class Chip:
     """The calibrations of a chip's two triads."""
 
-    gyro: Calibration = field(default_factory=Calibration)
-    accel: Calibration = field(default_factory=Calibration)
+    gyro: TriadCalibration = field(default_factory=TriadCalibration)
+    accel: TriadCalibration = field(default_factory=TriadCalibration)
 
 
 def product(matrix: Array, vectors: Array) -> Array:

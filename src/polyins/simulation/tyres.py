@@ -16,6 +16,7 @@ ground lets go falls with the body, no faster than gravity has it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,33 @@ class Suspension:
         return np.array([[1.0, 1.0, 1.0, 1.0], [x, x, -x, -x], [y, -y, y, -y]])
 
 
+class _Robot(NamedTuple):
+    """A body on its tyres, as the equations of motion have it."""
+
+    arms: Array
+    """as in `Suspension.arms`"""
+    acting: Array
+    """what the force of each tyre over the body's mass does to each mode, shape (3, 4)"""
+    tyre: Array
+    """stiffness, 1/s^2, and drag, 1/s, of a tyre over the body's mass; how far it is pressed in at rest, m; gravity,
+    m/s^2"""
+    least: float
+    """smallest force of a tyre over the body's mass, m/s^2"""
+
+
+class _Footing(NamedTuple):
+    """The ground under the wheels within a step."""
+
+    before: Array
+    """heights at its beginning, m, shape (4,)"""
+    after: Array
+    """and at its end"""
+    ahead: float
+    """the part of the step that is over"""
+    step: float
+    """s"""
+
+
 def bounce(ground: Array, step: float, suspension: Suspension, gravity: float) -> tuple[Array, Array]:
     """Return heave upwards, m, pitch and roll, rad, shape (T, 3), and their derivatives over rough ground.
 
@@ -58,26 +86,16 @@ def bounce(ground: Array, step: float, suspension: Suspension, gravity: float) -
     # equal tyres: of each mode the sum of squared arms, over its inertia, makes its natural frequency
     acting = (suspension.rates**2 / (arms**2).sum(axis=1))[:, None] * arms / suspension.rates[0] ** 2
     stiffness, drag = suspension.rates[0] ** 2, 2.0 * suspension.damping * suspension.rates[0]
-    tyre = np.array([stiffness, drag, gravity / stiffness, gravity])
     least = 0.0 if suspension.only_push else -np.inf
+    robot = _Robot(arms, acting, np.array([stiffness, drag, gravity / stiffness, gravity]), least)
     motion, change = np.zeros((len(ground), 3)), np.zeros((len(ground), 3))
     motion[0] = arms @ ground[0] / (arms**2).sum(axis=1)
-    _bounce(np.ascontiguousarray(ground), step, arms, acting, tyre, least, np.empty(30), motion, change)
+    _bounce(np.ascontiguousarray(ground), step, robot, np.empty(30), motion, change)
     return motion, change
 
 
 @kernel
-def _bounce(
-    ground: Array,
-    step: float,
-    arms: Array,
-    acting: Array,
-    tyre: Array,
-    least: float,
-    scratch: Array,
-    motion: Array,
-    change: Array,
-) -> None:
+def _bounce(ground: Array, step: float, robot: _Robot, scratch: Array, motion: Array, change: Array) -> None:
     """Fill motion and change from their first row."""
     slopes, place, speed = scratch[:24].reshape(4, 6), scratch[24:27], scratch[27:30]
     for k in range(1, len(ground)):
@@ -87,7 +105,7 @@ def _bounce(
                 before = max(stage - 1, 0)
                 place[i] = motion[k - 1, i] + ahead * step * slopes[before, i] if stage else motion[k - 1, i]
                 speed[i] = change[k - 1, i] + ahead * step * slopes[before, 3 + i] if stage else change[k - 1, i]
-            _accelerate(ground[k - 1], ground[k], ahead, step, arms, acting, tyre, least, place, speed, slopes[stage])
+            _accelerate(_Footing(ground[k - 1], ground[k], ahead, step), robot, place, speed, slopes[stage])
         for i in range(3):
             motion[k, i] = motion[k - 1, i] + step * _mean(slopes, i)
             change[k, i] = change[k - 1, i] + step * _mean(slopes, 3 + i)
@@ -100,33 +118,19 @@ def _mean(slopes: Array, i: int) -> float:
 
 
 @kernel
-def _accelerate(
-    before: Array,
-    after: Array,
-    ahead: float,
-    step: float,
-    arms: Array,
-    acting: Array,
-    tyre: Array,
-    least: float,
-    place: Array,
-    speed: Array,
-    slope: Array,
-) -> None:
-    """Write the derivatives of place and speed with the ground a part `ahead` of the step on.
-
-    `least` is the smallest force of a tyre.
-    """
+def _accelerate(footing: _Footing, robot: _Robot, place: Array, speed: Array, slope: Array) -> None:
+    """Write the derivatives of place and speed."""
+    before, after, ahead, step = footing
     for i in range(3):
         slope[i], slope[3 + i] = speed[i], 0.0
-    slope[3] = -tyre[3]
+    slope[3] = -robot.tyre[3]
     for wheel in range(4):
-        pressed = tyre[2] + before[wheel] + ahead * (after[wheel] - before[wheel])
+        pressed = robot.tyre[2] + before[wheel] + ahead * (after[wheel] - before[wheel])
         pressing = (after[wheel] - before[wheel]) / step
         for i in range(3):
-            pressed -= arms[i, wheel] * place[i]
-            pressing -= arms[i, wheel] * speed[i]
-        if pressed > least:
-            force = max(least, tyre[0] * pressed + tyre[1] * pressing)
+            pressed -= robot.arms[i, wheel] * place[i]
+            pressing -= robot.arms[i, wheel] * speed[i]
+        if pressed > robot.least:
+            force = max(robot.least, robot.tyre[0] * pressed + robot.tyre[1] * pressing)
             for i in range(3):
-                slope[3 + i] += acting[i, wheel] * force
+                slope[3 + i] += robot.acting[i, wheel] * force

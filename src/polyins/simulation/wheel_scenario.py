@@ -113,7 +113,7 @@ class Terrain(Section):
         )
 
 
-class Track(Terrain):
+class SurveyedTrack(Terrain):
     """A surveyed track and the speeds at which it is travelled."""
 
     file: str

@@ -74,11 +74,11 @@ def errors_of(scenario: Scenario, seed: int) -> tuple[Array, Array]:
     return navigation_errors(run.outputs.states[rows], truth), np.array(covariances)
 
 
-def _start(path: Path, told: StartStd, rng: np.random.Generator) -> StartOptions:
+def _start(path: Path, claimed: StartStd, rng: np.random.Generator) -> StartOptions:
     """Return the true state with errors drawn from the standard deviations that the filter is told."""
     truth = path.truth(np.array([STARTS_AT]))
-    position_std, velocity_std = np.array(told.position_m), np.array(told.velocity_m_s)
-    attitude_std = np.array(told.attitude_deg) * DEG
+    position_std, velocity_std = np.array(claimed.position_m), np.array(claimed.velocity_m_s)
+    attitude_std = np.array(claimed.attitude_deg) * DEG
     metres = metres_per_unit(truth.position[0], True)
     # the error of attitude is phi: C_hat = (I - phi x) C
     phi = rng.normal(0.0, attitude_std)

@@ -15,7 +15,7 @@ from polyins.evaluation.outages import outage_statistic
 from polyins.model.recording import Recording
 from polyins.navigate import batch
 from polyins.reading import datasets
-from polyins.simulation.error_scenario import Errors
+from polyins.simulation.error_scenario import SensorErrors
 from polyins.simulation.run import TrueRun, record
 from polyins.simulation.scenario import Scenario
 from polyins.studies.chips import Chips, compensate, draw_chips, read_chips
@@ -57,7 +57,7 @@ def provenance() -> str:
     return f"real, data set {DATASET}"
 
 
-def with_errors(run: TrueRun, errors: Errors) -> TrueRun:
+def with_errors(run: TrueRun, errors: SensorErrors) -> TrueRun:
     """Return the run with other errors."""
     return replace(run, scenario=run.scenario.model_copy(update={"errors": errors}))
 

@@ -55,7 +55,7 @@ def find(name: str) -> tuple[Target, ...]:
         return tuple(target for target in targets.values() if name == "all" or target.pictures)
     if name not in targets:
         names = (*targets, *SEVERAL)
-        near = difflib.get_close_matches(name, names, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names)}"
+        similar = difflib.get_close_matches(name, names, n=1)
+        hint = f"did you mean {similar[0]!r}?" if similar else f"expected one of {', '.join(names)}"
         raise InputError(f"reproduce: target {name!r} is unknown; {hint}")
     return (targets[name],)

@@ -70,7 +70,7 @@ DRIVING = 1.5
 
 
 @dataclass(frozen=True)
-class Track:
+class ReferenceAtFixes:
     """The reference of one trial at its fixes."""
 
     time: Array
@@ -93,7 +93,7 @@ class Trial:
 
     number: str
     recording: Recording
-    track: Track
+    track: ReferenceAtFixes
 
 
 def reproduce(
@@ -172,11 +172,11 @@ def load_trial(folder: Path, number: str) -> Trial:
     return Trial(number, recording, read_track(folder / f"trial{number}" / "reference.csv"))
 
 
-def read_track(path: Path) -> Track:
+def read_track(path: Path) -> ReferenceAtFixes:
     """Read a trial's `reference.csv`; raise InputError if a column or any usable fix is missing."""
     wanted = ("time_s", "antenna_north_m", "antenna_east_m", "usable", "heading_deg", "speed_m_s", "distance_m")
     _, (time, north, east, usable, heading_deg, speed, distance) = read_columns(path, wanted)
-    return Track(time, np.column_stack([north, east]), usable > 0.0, heading_deg * DEG, speed, distance)
+    return ReferenceAtFixes(time, np.column_stack([north, east]), usable > 0.0, heading_deg * DEG, speed, distance)
 
 
 def run_all(trial: Trial) -> dict[str, Solution]:
