@@ -633,7 +633,7 @@ np.save(sys.argv[1], [batch.run(recording, method).position[-1] for method in ("
 
 
 def test_the_engine_runs_uncompiled(tmp_path: Path) -> None:
-    tests = str(Path(__file__).parent)
+    tests = str(Path(__file__).parents[1])
     positions = []
     for disabled in ("0", "1"):
         out = tmp_path / f"{disabled}.npy"

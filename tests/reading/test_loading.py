@@ -29,7 +29,7 @@ from polyins.reading.imu_stream import mount_rotation
 from polyins.reading.loading import load
 from polyins.reading.position_stream import thinned
 
-EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def loaded(folder: Path, **changes: Any) -> Any:
