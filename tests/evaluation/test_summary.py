@@ -10,6 +10,7 @@ import polyins
 from polyins.evaluation.summary import comparison, summarize
 from polyins.formats.documents import plain
 from polyins.model.attitude import quaternions
+from polyins.model.findings import notes
 
 KEYS = {
     "polyins", "method", "imus", "rate_hz", "duration_s", "epochs", "filter_s", "us_per_epoch", "first_call_s",
@@ -29,7 +30,7 @@ def test_a_run_document_has_all_keys_and_the_figures():
     truth = drive()
     shown = innovations(np.arange(1001.0, 1060.0), 1, rejected=(4,))
     ours = off_by(3.0, (1015.0, 1016.0), imus=4, method="enav-fusion", filter_s=0.25, measurements=of_fixes(shown),
-                  warnings=("odd",), start={"heading": np.float64(0.5), "position": np.zeros(3)})  # fmt: skip
+                  findings=notes(["odd"]), start={"heading": np.float64(0.5), "position": np.zeros(3)})  # fmt: skip
     document = summarize(ours, reference(truth), OUTAGES)
     assert set(document) >= KEYS
     assert json.loads(json.dumps(document, allow_nan=False)) == document

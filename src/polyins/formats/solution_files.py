@@ -16,6 +16,7 @@ from polyins.files import whole
 from polyins.formats.arrow_arrays import texts_to_arrow, to_arrow, to_numpy
 from polyins.formats.documents import plain
 from polyins.model.attitude import euler_angles, euler_variance, quaternions
+from polyins.model.findings import Finding, notes
 from polyins.model.geodesy import displacement
 from polyins.model.recording import usual_interval
 from polyins.model.solution import Solution, Trajectory
@@ -117,9 +118,9 @@ def read_solution(path: Path) -> Solution:
     time = _column(columns, "time_s", file)
     geodetic = not np.all(np.isnan(_column(columns, "latitude_deg", file)))
     names, error_time, errors = _read_imu_errors(file.with_name(IMU_ERRORS), tuple(metadata.get("imu_names", ())))
-    warnings = tuple(metadata.get("warnings", ()))
+    findings = tuple(Finding(**one) for one in metadata.get("findings", ()))
     if "point" not in metadata:
-        warnings += (f"{file}: does not say which point it describes; the array origin is assumed",)
+        findings += notes([f"{file}: does not say which point it describes; the array origin is assumed"], "point")
     phi_variance = np.radians(_table(columns, _PHI_STD, file)) ** 2
     return Solution(
         method=metadata.get("method", file.stem),
@@ -140,7 +141,7 @@ def read_solution(path: Path) -> Solution:
         start=metadata.get("start", {}),
         filter_s=metadata.get("filter_s", 0.0),
         first_call_s=metadata.get("first_call_s", 0.0),
-        warnings=warnings,
+        findings=findings,
     )
 
 
@@ -199,7 +200,7 @@ def _metadata(solution: Solution, origin: Array) -> dict[str, object]:
         "start": solution.start,
         "filter_s": solution.filter_s,
         "first_call_s": solution.first_call_s,
-        "warnings": solution.warnings,
+        "findings": [finding.document() for finding in solution.findings],
     }
 
 

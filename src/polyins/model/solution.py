@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.model.findings import SILENT, Finding
 from polyins.model.rig import Vector
 
 Array = NDArray[np.float64]
@@ -133,15 +134,24 @@ class Solution:
     mount pitch and yaw (rad), shape (K, N, 3)"""
     mounting_std: Array | None = None
     """shape (K, N, 3); zero where it is not estimated"""
-    faults: tuple[str, ...] = ()
-    """IMUs that fell silent, in words"""
     start: dict[str, object] = field(default_factory=dict)
     """how the start was found: time, position, velocity, roll and pitch, heading, gyro bias"""
     filter_s: float = 0.0
     """CPU time inside the compiled loop"""
     first_call_s: float = 0.0
     """time spent on compiling or loading the kernels"""
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    """what there is to say of data and run"""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The findings as sentences, but for IMUs that fell silent."""
+        return tuple(one.sentence for one in self.findings if one.kind != SILENT)
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """IMUs that fell silent, as sentences."""
+        return tuple(one.sentence for one in self.findings if one.kind == SILENT)
 
     @property
     def trajectory(self) -> Trajectory:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from polyins.aiding import kinds
 from polyins.errors import InputError
 from polyins.kernels import dense
+from polyins.model.findings import SILENT, Finding, notes
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
 from polyins.model.solution import Innovations, OffsetEstimate, Solution
@@ -285,11 +286,14 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         offsets=offsets_of(run, lanes),
         mounting=log[:, 0, :, 12:15] if recording.rig.has_wheels else None,
         mounting_std=log[:, 1, :, 12:15] if recording.rig.has_wheels else None,
-        faults=silences(run.choice, recording, aligned) if recording.rig.has_wheels else (),
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,
-        warnings=recording.warnings + aligned.warnings,
+        findings=(
+            *notes(recording.warnings),
+            *aligned.findings,
+            *(silences(run.choice, recording, aligned) if recording.rig.has_wheels else ()),
+        ),
     )
 
 
@@ -333,14 +337,16 @@ def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, OffsetEstimate]:
     return found
 
 
-def silences(choice: Choice, recording: Recording, aligned: Aligned) -> tuple[str, ...]:
-    """Return in words which IMUs were silent for how long, of a choice and what became of them."""
+def silences(choice: Choice, recording: Recording, aligned: Aligned) -> tuple[Finding, ...]:
+    """Return which IMUs were silent for how long, of a choice and what became of them."""
     found = []
     for i, imu in enumerate(recording.rig.imus):
         for first, end in _stretches(aligned.missing[:, i]):
             begin, last = aligned.time[max(first - 1, 0)], aligned.time[end - 1]
             outcome = _outcome(choice, i, aligned, first, end)
-            found.append(f"IMU {imu.name}: silent for {last - begin:.2f} s from {begin:.2f} s; {outcome}")
+            begin, last = float(begin), float(last)
+            text = f"IMU {imu.name}: silent for {last - begin:.2f} s from {begin:.2f} s; {outcome}"
+            found.append(Finding(SILENT, text, stream=imu.name, from_s=begin, to_s=last, size=last - begin))
     return tuple(found)
 
 

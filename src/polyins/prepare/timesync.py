@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
+from polyins.model.findings import Finding
 from polyins.model.recording import ImuStream, usual_interval
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ class Aligned:
     """s, shape (T,)"""
     increments: Array
     """dtheta (rad) and dvel (m/s) over the interval that ends at `time`, shape (T, 6, N)"""
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     missing: NDArray[np.bool_]
     """where an IMU has a gap, shape (T, N); what stands there is bridged, or zero"""
 
@@ -37,11 +38,16 @@ class Aligned:
         """Nominal rate: one over the usual interval."""
         return 1.0 / usual_interval(self.time)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The findings as sentences."""
+        return tuple(finding.sentence for finding in self.findings)
+
     def between(self, begin: float, end: float) -> Aligned:
         """Return the epochs with begin <= time <= end."""
         first, last = np.searchsorted(self.time, [begin, np.nextafter(end, np.inf)])
         part = slice(first, last)
-        return Aligned(self.time[part], self.increments[part], self.warnings, self.missing[part])
+        return Aligned(self.time[part], self.increments[part], self.findings, self.missing[part])
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,7 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | No
     time = _common_time(streams, whole)
     on_base: list[tuple[Array, Array]] = []
     missing = np.zeros((len(time), len(streams)), dtype=bool)
-    warnings = late_warnings(streams)
+    findings = late_beginnings(streams)
     for i, (stream, known) in enumerate(zip(streams, gaps_by_stream, strict=True)):
         if not stream.time.size:
             on_base.append((np.zeros((len(time), 3)), np.zeros((len(time), 3))))
@@ -104,27 +110,29 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | No
         for begin, end in gaps:
             missing[np.searchsorted(time, begin, "right") : np.searchsorted(time, end) + 1, i] = True
         if gaps:
-            warnings.append(gap_warning(stream.name, gaps))
+            findings.append(gap_finding(stream.name, gaps))
     increments = _interleaved(on_base, len(time))
     if missing.any():
         if bridge:
             _bridge(time, increments, missing)
         else:
             increments[np.broadcast_to(missing[:, None, :], increments.shape)] = 0.0
-    return Aligned(time, increments, tuple(warnings), missing)
+    return Aligned(time, increments, tuple(findings), missing)
 
 
-def late_warnings(streams: tuple[ImuStream, ...]) -> list[str]:
+def late_beginnings(streams: tuple[ImuStream, ...]) -> list[Finding]:
     """Say which IMU the others have to wait for."""
     begins = np.array([stream.time[0] if stream.time.size else -np.inf for stream in streams])
     latest = int(np.argmax(begins))
     wait = float(begins[latest] - begins.min())
     if not LATE < wait < np.inf:
         return []
-    return [
-        f"IMU {streams[latest].name}: begins at {begins[latest]:.3f} s, {wait:.1f} s after the first one; what the"
-        " others measured before is not used"
-    ]
+    name, begin = streams[latest].name, float(begins[latest])
+    text = (
+        f"IMU {name}: begins at {begin:.3f} s, {wait:.1f} s after the first one; what the others measured before is not"
+        " used"
+    )
+    return [Finding("late begin", text, stream=name, from_s=begin - wait, to_s=begin, size=wait)]
 
 
 def common_end(ends: Array) -> float:
@@ -199,11 +207,12 @@ def gaps_of(stamps: Array, usual: float) -> list[tuple[float, float]]:
     return [(float(stamps[k]), float(stamps[k + 1])) for k in where]
 
 
-def gap_warning(name: str, gaps: Sequence[tuple[float, float]]) -> str:
+def gap_finding(name: str, gaps: Sequence[tuple[float, float]]) -> Finding:
     """Say how many gaps an IMU has and where the longest is."""
     begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
     count = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
-    return f"IMU {name}: {count} of {end - begin:.3f} s at {begin:.3f} s"
+    text = f"IMU {name}: {count} of {end - begin:.3f} s at {begin:.3f} s"
+    return Finding("gap", text, stream=name, from_s=begin, to_s=end, size=end - begin)
 
 
 def _bridge(time: Array, increments: Array, missing: NDArray[np.bool_]) -> None:

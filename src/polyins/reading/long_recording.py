@@ -17,6 +17,7 @@ from polyins.errors import InputError
 from polyins.files import find_named
 from polyins.formats.columns import is_parquet
 from polyins.formats.rows import ImuRows
+from polyins.model.findings import Finding
 from polyins.model.recording import ImuStream, Recording
 from polyins.prepare import timesync
 from polyins.prepare.timesync import Aligned, Whole
@@ -90,11 +91,11 @@ class LongRecording:
             before = border
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Say which IMUs begin late or have gaps."""
         gaps = zip(self.head.rig.imus, self.gaps, strict=True)
-        late = timesync.late_warnings(self.head.imus)
-        return (*late, *(timesync.gap_warning(imu.name, known) for imu, known in gaps if known))
+        late = timesync.late_beginnings(self.head.imus)
+        return (*late, *(timesync.gap_finding(imu.name, known) for imu, known in gaps if known))
 
     @property
     def _bridge(self) -> bool:

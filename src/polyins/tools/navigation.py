@@ -17,6 +17,7 @@ from polyins.evaluation.errors import Errors
 from polyins.evaluation.figures import Figures
 from polyins.evaluation.summary import document
 from polyins.formats.solution_files import SolutionWriter
+from polyins.model.findings import Finding, notes
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
@@ -105,8 +106,8 @@ def _parts(
         part = batch.navigate(run)
         if progress:
             progress(float((stretch.time[-1] - start.time) / (end - start.time)))
-        warnings = (*recording.head.warnings, *recording.warnings)
-        yield replace(part, warnings=warnings, faults=silent.faults())
+        known = (*notes(recording.head.warnings), *recording.findings, *silent.findings())
+        yield replace(part, findings=known)
 
 
 def _extent(recording: LongRecording, row: Method) -> tuple[Start, float]:
@@ -136,7 +137,7 @@ class _Silences:
             near = np.convolve(some, [1, 1, 1], "same") > 0
             self._seen.append(replace(stretch, time=stretch.time[near], missing=stretch.missing[near]))
 
-    def faults(self) -> tuple[str, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         if not self._seen:
             return ()
         time, first = np.unique(np.concatenate([part.time for part in self._seen]), return_index=True)
