@@ -21,6 +21,7 @@ from polyins.version import __version__
 
 if TYPE_CHECKING:
     from polyins.evaluation.documents import CompareDocument
+    from polyins.model.findings import Level
     from polyins.model.recording import Recording
     from polyins.reading.loading import Settings
     from polyins.reading.long_recording import LongRecording
@@ -30,6 +31,9 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
 SECONDS = click.FloatRange(0.0, 1e6)
 RATE = click.FloatRange(0.0, 1e4, min_open=True)
+
+NOT_TO_BE_USED = 3
+"""exit code"""
 
 COLLECT_AFTER = 300_000
 """new objects before Python looks for garbage: a start imports nearly as many, and all of them stay"""
@@ -58,14 +62,16 @@ def cli(debug: bool) -> None:
 
 
 def main() -> None:
-    """Run the command line; exit 0 if done, 1 if it failed while running, 2 if command line or input are wrong."""
+    """Run the command line.
+
+    Exit 0 if done, 1 if it failed while running, 2 if command line or input are wrong, 3 if what came out is not to be
+    used.
+    """
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     sys.setswitchinterval(TURN_S)
     try:
-        cli.main(arguments, prog_name="polyins", standalone_mode=False)
-    except click.exceptions.Exit as exit_:
-        sys.exit(exit_.exit_code)
+        sys.exit(cli.main(arguments, prog_name="polyins", standalone_mode=False) or 0)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "polyins"
         say(f"polyins: {error.format_message()} See {command} --help")
@@ -96,7 +102,7 @@ def demo(out: Path) -> None:
     with progress("simulating"):
         config = files.write(drive(scenario()), out / "recording")
     say(f"recording: {config}")
-    _compare(config, None, Files(out), as_json=False, no_report=False)
+    _compare(config, None, Files(out), as_json=False, no_report=False, judged=False)
 
 
 @cli.command()
@@ -136,10 +142,11 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     summary = outcome.summary
     if as_json:
         _print_json(summary)
-        return
-    print_summaries(known.name, {name: summary}, {})
-    say("start: " + ", ".join(f"{key} {value}" for key, value in summary["start"].items()))
-    say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+    else:
+        print_summaries(known.name, {name: summary}, {})
+        say("start: " + ", ".join(f"{key} {value}" for key, value in summary["start"].items()))
+        say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+    _exit_by([summary["verdict"]["level"]])
 
 
 def _open(settings: Settings) -> Recording | LongRecording:
@@ -148,6 +155,14 @@ def _open(settings: Settings) -> Recording | LongRecording:
     from polyins.reading.long_recording import open_long
 
     return open_long(settings) or load_settings(settings)
+
+
+def _exit_by(levels: list[Level]) -> None:
+    """Exit with 3 if none of the results is to be used."""
+    from polyins.model.findings import DO_NOT_USE
+
+    if all(level == DO_NOT_USE for level in levels):
+        raise click.exceptions.Exit(NOT_TO_BE_USED)
 
 
 def _print_json(document: Mapping[str, Any]) -> None:
@@ -199,7 +214,13 @@ def compare(configs: tuple[Path, ...], methods: str | None, single_rate: float, 
 
 
 def _compare(
-    config: Path, methods: list[str] | None, files: Files, as_json: bool, no_report: bool, threads: int | None = None
+    config: Path,
+    methods: list[str] | None,
+    files: Files,
+    as_json: bool,
+    no_report: bool,
+    threads: int | None = None,
+    judged: bool = True,
 ) -> None:
     from polyins.reading.loading import read_config
     from polyins.tools import navigation, results
@@ -215,9 +236,11 @@ def _compare(
         results.write_comparison(out, recording, result, report=not no_report)
     if as_json:
         _print_json(result.document)
-        return
-    _print_comparison(navigation.head(recording).name, result.document)
-    say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+    else:
+        _print_comparison(navigation.head(recording).name, result.document)
+        say(f"files: {out}" + ("" if no_report else f", report: {out / 'report.html'}"))
+    if judged:
+        _exit_by([method["verdict"]["level"] for method in result.document["methods"].values()])
 
 
 def _compare_several(
@@ -244,14 +267,16 @@ def _compare_several(
     with compilation_said(), progress("compare") as update:
         document = compare_several(readers, write, methods, files=files, threads=threads, progress=update)
     write_document(out / "summary.json", document)
+    parts = document["recordings"]
     if as_json:
         _print_json(document)
-        return
-    for name, part in document["recordings"].items():
-        _print_comparison(name, part)
-    pooled = document["pooled"]
-    print_summaries(f"over {len(configs)} recordings", pooled["methods"], pooled["ratio_to_single"])
-    say(f"files: {out}" + ("" if no_report else f", reports: {out / '*' / 'report.html'}"))
+    else:
+        for name, part in parts.items():
+            _print_comparison(name, part)
+        pooled = document["pooled"]
+        print_summaries(f"over {len(configs)} recordings", pooled["methods"], pooled["ratio_to_single"])
+        say(f"files: {out}" + ("" if no_report else f", reports: {out / '*' / 'report.html'}"))
+    _exit_by([method["verdict"]["level"] for part in parts.values() for method in part["methods"].values()])
 
 
 def _print_comparison(name: str, document: CompareDocument) -> None:
@@ -340,6 +365,7 @@ def evaluate(solution: Path, reference: Path, as_json: bool) -> None:
         _print_json(summary)
     else:
         print_summaries(str(solution), {estimate.method: summary}, {})
+    _exit_by([summary["verdict"]["level"]])
 
 
 @cli.command()

@@ -14,7 +14,7 @@ from polyins.model.findings import notes
 
 KEYS = {
     "polyins", "method", "imus", "rate_hz", "duration_s", "epochs", "filter_s", "us_per_epoch", "first_call_s",
-    "reference", "outages", "drift", "consistency", "faults", "warnings",
+    "reference", "outages", "drift", "consistency", "faults", "warnings", "verdict", "coverage", "exclusions",
 }  # fmt: skip
 OUTAGES = ((1010.0, 1020.0), (1040.0, 1050.0))
 

@@ -7,6 +7,7 @@ from html import unescape
 import pytest
 
 from polyins.errors import InputError
+from polyins.model.findings import Finding, Verdict
 from polyins.report import Scene, write_report
 
 
@@ -37,7 +38,7 @@ def test_it_says_what_was_run(text):
     assert "3 of 30 s" in run
     assert "position, velocity, attitude; 6,001 epochs" in run
     assert "start: heading from the course over ground" in run
-    assert "one IMU was late" in words(text, "warnings")
+    assert "one IMU was late" in words(text, "verdict")
     assert "method: all" in words(text, "config")
 
 
@@ -53,14 +54,18 @@ def test_names_cannot_smuggle_in_markup(text):
     assert "&lt;script&gt;throw 1" in text
 
 
-def test_warnings_of_some_runs_name_them(made_runs, made_recording, tmp_path):
+def of(*texts: str) -> dict:
+    return Verdict(tuple(Finding("odd", text, "doubt") for text in texts)).document()
+
+
+def test_findings_of_some_runs_name_them(made_runs, made_recording, tmp_path):
     runs = {
-        name: (made, {**summary, "warnings": ["slow"] if name == "single" else []})
+        name: (made, {**summary, "verdict": of("slow") if name == "single" else of()})
         for name, (made, summary) in made_runs.items()
     }
     write_report(tmp_path / "report.html", Scene.of(runs, made_recording))
-    warnings = words((tmp_path / "report.html").read_text(encoding="utf-8"), "warnings")
-    assert "single: slow" in warnings
+    warnings = words((tmp_path / "report.html").read_text(encoding="utf-8"), "verdict")
+    assert "doubt single: slow" in warnings
 
 
 def test_columns_in_which_nothing_is_known_are_left_out(made_runs, made_recording, tmp_path):
@@ -75,7 +80,7 @@ def test_columns_in_which_nothing_is_known_are_left_out(made_runs, made_recordin
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "rmse" not in words(text, "figures")
     assert "NIS GNSS" in words(text, "figures")
-    for absent in ("outages", "velocity", "config", "warnings"):
+    for absent in ("outages", "velocity", "config"):
         assert f'id="{absent}"' not in text
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NotRequired, TypedDict
+from collections.abc import Mapping
+from typing import Any, NotRequired, TypedDict
+
+from polyins.model.findings import Level, Severity
 
 
 class ErrorFigures(TypedDict):
@@ -74,6 +77,42 @@ class MountingEstimate(TypedDict):
     std: list[float]
 
 
+class CoverageFigures(TypedDict):
+    """From when to when there is a solution."""
+
+    from_s: float
+    to_s: float
+    of_recording: float | None
+    """share; None: the recording's length is not known"""
+
+
+class FindingDocument(TypedDict):
+    """A finding, see `model.findings.Finding`."""
+
+    severity: Severity
+    kind: str
+    text: str
+    stream: str
+    axis: str | None
+    from_s: float | None
+    to_s: float | None
+    size: float | str | None
+    expected: float | str | None
+    remedy: str
+
+
+def sentence(finding: Mapping[str, Any]) -> str:
+    """Return what a finding is and what to do."""
+    return f"{finding['text']}; {finding['remedy']}" if finding["remedy"] else str(finding["text"])
+
+
+class VerdictDocument(TypedDict):
+    """Whether the run can be built on."""
+
+    level: Level
+    findings: list[FindingDocument]
+
+
 class MethodDocument(TypedDict):
     """What the documents of one run and of several recordings together have in common."""
 
@@ -99,9 +138,14 @@ class RunDocument(MethodDocument):
     measurements: dict[str, MeasurementCounts]
     offsets: dict[str, Estimate]
     start: dict[str, object]
+    verdict: VerdictDocument
+    coverage: CoverageFigures
+    exclusions: list[dict[str, object]]
     faults: list[str]
     mounting: dict[str, MountingEstimate]
     warnings: list[str]
+    imu: NotRequired[str]
+    """of a single IMU its name"""
     each: NotRequired[list[RunDocument]]
     """of single IMUs, which the figures are those of all of"""
 

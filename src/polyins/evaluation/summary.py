@@ -14,6 +14,7 @@ from polyins.evaluation.documents import (
     ConsistencyFigures,
     DriftFigures,
     ErrorFigures,
+    FindingDocument,
     GnssCounts,
     MeasurementCounts,
     MethodDocument,
@@ -24,19 +25,19 @@ from polyins.evaluation.documents import (
 from polyins.evaluation.drift import drift
 from polyins.evaluation.errors import rms
 from polyins.evaluation.figures import Figures
-from polyins.evaluation.outages import Interval, outage_statistic, partly_covered
+from polyins.evaluation.outages import Interval, outage_statistic
+from polyins.evaluation.verdict import coverage, verdict
 from polyins.formats.documents import plain
+from polyins.model.findings import LEVELS, Finding
 from polyins.model.methods import METHODS
 from polyins.model.recording import Reference
 from polyins.model.solution import Innovations, Solution
 from polyins.version import __version__
 
 Array = NDArray[np.float64]
+BETTER = 1.1
+"""times the error of one IMU alone, above which a method is worse than it"""
 GNSS_COUNTS = ("fixes", "rejected", "reopened", "velocities_rejected")
-
-NEGLIGIBLE_SHARE = 0.01
-NEGLIGIBLE_S = 1.0
-"""A reference may lack less than this of the epochs, and less than this of the time, without a warning."""
 
 
 def summarize(solution: Solution, reference: Reference | None, outages: Sequence[Interval] = ()) -> RunDocument:
@@ -52,6 +53,7 @@ def summarize(solution: Solution, reference: Reference | None, outages: Sequence
 def document(solution: Solution, figures: Figures) -> RunDocument:
     """Return the `run` document of figures; of the solution only what has no row per epoch is looked at."""
     epochs, errors = figures.epochs, figures.errors
+    judged = verdict(solution, figures)
     whole = {
         "polyins": __version__,
         "method": solution.method,
@@ -74,9 +76,12 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
             if one.value.size
         },
         "start": solution.start,
-        "faults": list(solution.faults),
+        "verdict": judged.document(),
+        "coverage": coverage(solution, figures.epochs),
+        "exclusions": [],
+        "faults": judged.faults,
         "mounting": _mounting(solution),
-        "warnings": [*solution.warnings, *_warnings(figures)],
+        "warnings": judged.warnings,
     }
     return cast(RunDocument, plain(whole))
 
@@ -90,7 +95,7 @@ def comparison(
     divides that figure by a method's: the outage statistic, or without outages the horizontal rms (paper A, section
     IV). The time ratio divides the method's time per epoch by a single IMU's.
     """
-    methods = {name: summary for name, summary in summaries.items() if name != alone}
+    methods = {name: _against(each, summary) for name, summary in summaries.items() if name != alone}
     single = pooled(each) if each else None
     imus = len(each) or max((summary["imus"] for summary in methods.values()), default=1)
     return {
@@ -100,6 +105,30 @@ def comparison(
         "time_ratio_to_single": {name: _ratio(_cost(summary), _cost(single)) for name, summary in methods.items()},
         "sqrt_n": float(np.sqrt(imus)),
     }
+
+
+def _against(each: Sequence[RunDocument], summary: RunDocument) -> RunDocument:
+    """Return a method's document with a finding if one IMU alone beats it."""
+    known = [(found, one) for one in each if (found := figure(one)) is not None]
+    own = figure(summary)
+    if own is None or len(known) < 2:
+        return summary
+    best, of = min(known, key=lambda pair: pair[0])
+    worst = max(known, key=lambda pair: pair[0])[1]
+    if own <= BETTER * best:
+        return summary
+    finding = Finding(
+        "single better",
+        f"{of.get('imu', 'one IMU')} alone is better than all together: {best:.3g} against {own:.3g}",
+        stream=worst.get("imu", ""),
+        size=own / best,
+        expected=1.0,
+        remedy=f"look at {worst.get('imu', 'the worst IMU')}, which is the worst alone, or leave it out",
+    )
+    judged = summary["verdict"]
+    said = cast(FindingDocument, plain(finding.document()))
+    warnings = [*summary["warnings"], finding.sentence]
+    return {**summary, "warnings": warnings, "verdict": {**judged, "findings": [*judged["findings"], said]}}
 
 
 def pooled(each: Sequence[RunDocument]) -> RunDocument:
@@ -118,6 +147,7 @@ def pooled(each: Sequence[RunDocument]) -> RunDocument:
             **_gnss_counts(each),
             "rejected_times_s": sorted({time for summary in each for time in summary["gnss"]["rejected_times_s"]}),
         },
+        "verdict": max((summary["verdict"] for summary in each), key=lambda one: LEVELS.index(one["level"])),
         "warnings": list(dict.fromkeys(warning for summary in each for warning in summary["warnings"])),
         "each": list(each),
     }
@@ -222,26 +252,6 @@ def _mounting(solution: Solution) -> dict[str, object]:
         for name, value, std in zip(solution.imu_names, solution.mounting[-1], solution.mounting_std[-1], strict=True)
         if std.any()
     }
-
-
-def _warnings(figures: Figures) -> list[str]:
-    found, epochs, errors = [], figures.epochs, figures.errors
-    if epochs.broken:
-        found.append(f"the solution is not finite at {epochs.broken} of {epochs.count} epochs: it diverged")
-    if errors is None:
-        return found
-    share = epochs.uncovered / max(epochs.count, 1)
-    # streams hardly ever begin and end together
-    if share > NEGLIGIBLE_SHARE and share * epochs.duration >= NEGLIGIBLE_S:
-        found.append(
-            f"reference: covers {epochs.count - epochs.uncovered} of {epochs.count} epochs; "
-            f"{epochs.uncovered} are left out of the errors"
-        )
-    found.extend(
-        f"outage {begin:.3f} s to {end:.3f} s: solution and reference do not cover all of it; its maximum may be larger"
-        for begin, end in partly_covered(errors, figures.outages, epochs.interval)
-    )
-    return found
 
 
 def _pooled_outages(statistics: Sequence[OutageFigures]) -> OutageFigures:

@@ -141,6 +141,7 @@ def read_solution(path: Path) -> Solution:
         start=metadata.get("start", {}),
         filter_s=metadata.get("filter_s", 0.0),
         first_call_s=metadata.get("first_call_s", 0.0),
+        recording_span=None if metadata.get("recording_span") is None else tuple(metadata["recording_span"]),
         findings=findings,
     )
 
@@ -200,6 +201,7 @@ def _metadata(solution: Solution, origin: Array) -> dict[str, object]:
         "start": solution.start,
         "filter_s": solution.filter_s,
         "first_call_s": solution.first_call_s,
+        "recording_span": solution.recording_span,
         "findings": [finding.document() for finding in solution.findings],
     }
 

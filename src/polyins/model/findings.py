@@ -12,6 +12,8 @@ Level = Literal["trust", "doubt", "do-not-use"]
 TRUST: Level = "trust"
 DOUBT: Level = "doubt"
 DO_NOT_USE: Level = "do-not-use"
+LEVELS: tuple[Level, ...] = (TRUST, DOUBT, DO_NOT_USE)
+"""from good to bad"""
 
 SILENT = "silent"
 """kind of the finding that an IMU gave no data for a while, which the others bridged"""
@@ -60,6 +62,16 @@ class Verdict:
         """By the worst of the findings."""
         severities = {finding.severity for finding in self.findings}
         return DO_NOT_USE if "serious" in severities else DOUBT if "doubt" in severities else TRUST
+
+    @property
+    def warnings(self) -> list[str]:
+        """All findings as sentences, but for IMUs that fell silent."""
+        return [one.sentence for one in self.findings if one.kind != SILENT]
+
+    @property
+    def faults(self) -> list[str]:
+        """IMUs that fell silent, as sentences."""
+        return [one.sentence for one in self.findings if one.kind == SILENT]
 
     @property
     def reasons(self) -> list[str]:

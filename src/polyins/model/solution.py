@@ -140,6 +140,8 @@ class Solution:
     """CPU time inside the compiled loop"""
     first_call_s: float = 0.0
     """time spent on compiling or loading the kernels"""
+    recording_span: tuple[float, float] | None = None
+    """s, s: what the IMUs of the recording cover"""
     findings: tuple[Finding, ...] = ()
     """what there is to say of data and run"""
 

@@ -289,12 +289,18 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,
+        recording_span=_span(recording),
         findings=(
             *notes(recording.warnings),
             *aligned.findings,
             *(silences(run.choice, recording, aligned) if recording.rig.has_wheels else ()),
         ),
     )
+
+
+def _span(recording: Recording) -> tuple[float, float] | None:
+    stamps = [stream.time[[0, -1]] for stream in recording.imus if stream.time.size]
+    return (float(np.min(stamps)), float(np.max(stamps))) if stamps else None
 
 
 def innovations_of(run: Prepared) -> dict[str, Innovations]:

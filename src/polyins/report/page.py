@@ -16,7 +16,7 @@ from polyins.report.imu_errors import imu_error_figure
 from polyins.report.innovations import innovation_figure, other_kinds
 from polyins.report.outage_bars import outage_figure
 from polyins.report.scene import Scene
-from polyins.report.tables import facts, figures_table, warnings_by_text
+from polyins.report.tables import facts, figures_table, findings_by_text, verdicts
 from polyins.report.trajectory import trajectory_figure
 from polyins.version import __version__
 
@@ -60,7 +60,8 @@ def write_report(path: Path, scene: Scene, comparison: CompareDocument | None = 
         version=__version__,
         facts=facts(scene),
         table=figures_table(scene, comparison),
-        warnings=warnings_by_text(scene),
+        findings=findings_by_text(scene),
+        verdicts=verdicts(scene),
         sections=_sections(scene),
         config=recording.config_text,
         plotly=_plotly_script(),

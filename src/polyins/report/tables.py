@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from polyins.evaluation.documents import CompareDocument, OutageFigures, RunDocument
+from polyins.evaluation.documents import CompareDocument, OutageFigures, RunDocument, sentence
 from polyins.evaluation.summary import on_wheels
 from polyins.formats.documents import plain
 from polyins.model.recording import Recording
@@ -75,14 +75,25 @@ def facts(scene: Scene) -> list[Cell]:
     ]
 
 
-def warnings_by_text(scene: Scene) -> list[tuple[str, str]]:
-    """Return each warning once, with the runs that gave it; without a name if all did or it is the recording's."""
+def findings_by_text(scene: Scene) -> list[tuple[str, str, str]]:
+    """Return severity and sentence of each finding once, the worst first, with the runs that it is of if not of all."""
+    given: dict[tuple[str, str], list[str]] = {}
+    for run in scene.runs:
+        for finding in run.summary["verdict"]["findings"]:
+            names = given.setdefault((finding["severity"], sentence(finding)), [])
+            names.extend([run.name] if run.name not in names else [])
+    known = [(*of, "" if len(names) == len(scene.runs) else ", ".join(names)) for of, names in given.items()]
+    texts = {text for _, text, _ in known}
+    known += [("note", text, "") for text in dict.fromkeys(scene.recording.warnings) if text not in texts]
+    return sorted(known, key=lambda one: ("serious", "doubt", "note").index(one[0]))
+
+
+def verdicts(scene: Scene) -> list[tuple[str, str]]:
+    """Return each level once, with the runs that have it; without a name if all have."""
     given: dict[str, list[str]] = {}
     for run in scene.runs:
-        for text in dict.fromkeys(run.summary["warnings"]):
-            given.setdefault(text, []).append(run.name)
-    named = {text: "" if len(names) == len(scene.runs) else ", ".join(names) for text, names in given.items()}
-    return list({**named, **dict.fromkeys(scene.recording.warnings, "")}.items())
+        given.setdefault(run.summary["verdict"]["level"], []).append(run.name)
+    return [(level, "" if len(given) == 1 else ", ".join(names)) for level, names in given.items()]
 
 
 def _figures(run: Run, comparison: CompareDocument | None) -> list[Cell]:

@@ -102,7 +102,7 @@ def compare(
     return Comparison(
         outcomes,
         {name: outcome.solution for name, outcome in each.items()},
-        comparison(summaries, [outcome.summary for outcome in each.values()], alone),
+        comparison(summaries, [{**outcome.summary, "imu": name} for name, outcome in each.items()], alone),
     )
 
 

@@ -16,6 +16,7 @@ from polyins.evaluation.documents import RunDocument
 from polyins.evaluation.errors import Errors
 from polyins.evaluation.figures import Figures
 from polyins.evaluation.summary import document
+from polyins.evaluation.verdict import of_measurements
 from polyins.formats.solution_files import SolutionWriter
 from polyins.model.findings import Finding, notes
 from polyins.model.methods import Method, find_method
@@ -78,10 +79,11 @@ def run(
                 part, errors = _thinned(part, errors, float(share))
             shown.append((part, errors))
         solution = Solution.joined([part for part, _ in shown])
+        found = replace(solution, findings=(*solution.findings, *of_measurements(solution)))
         for writer in writers:
-            writer.finish(solution)
-    found = [errors for _, errors in shown if errors is not None]
-    return Outcome(solution, Errors.joined(found) if found else None, document(solution, figures))
+            writer.finish(found)
+    judged = [errors for _, errors in shown if errors is not None]
+    return Outcome(solution, Errors.joined(judged) if judged else None, document(solution, figures))
 
 
 def _parts(
@@ -107,7 +109,8 @@ def _parts(
         if progress:
             progress(float((stretch.time[-1] - start.time) / (end - start.time)))
         known = (*notes(recording.head.warnings), *recording.findings, *silent.findings())
-        yield replace(part, findings=known)
+        span = min(one.first for one in recording.extents), max(one.last for one in recording.extents)
+        yield replace(part, findings=known, recording_span=span)
 
 
 def _extent(recording: LongRecording, row: Method) -> tuple[Start, float]:

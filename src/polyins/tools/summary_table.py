@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from polyins.evaluation.documents import sentence
 from polyins.screen import number, print_table, say
 
 FIGURES = (
@@ -39,8 +40,18 @@ def print_summaries(title: str, summaries: Mapping[str, Mapping[str, Any]], rati
         gnss = summary["gnss"]
         if gnss["rejected"]:
             say(f"{name}: {gnss['rejected']} of {gnss['fixes']} GNSS fixes rejected")
-    for text in dict.fromkeys(text for summary in summaries.values() for text in summary.get("warnings", ())):
-        say(f"warning: {text}")
+    verdicts = {name: summary["verdict"] for name, summary in summaries.items() if "verdict" in summary}
+    said: dict[str, list[str]] = {}
+    for name, one in verdicts.items():
+        for finding in one["findings"]:
+            said.setdefault(f"{finding['severity']}: {sentence(finding)}", []).append(name)
+    for text, names in said.items():
+        say(text if len(names) == len(verdicts) else f"{', '.join(names)}: {text}")
+    levels: dict[str, list[str]] = {}
+    for name, one in verdicts.items():
+        levels.setdefault(one["level"], []).append(name)
+    for level, names in levels.items():
+        say(f"verdict: {level}" + ("" if len(levels) == 1 else f" ({', '.join(names)})"))
 
 
 def _figure(summary: Mapping[str, Any], keys: tuple[str, ...]) -> float | None:

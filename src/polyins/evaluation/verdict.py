@@ -1,0 +1,195 @@
+"""Whether a solution can be trusted, judged without a reference from what the filter saw of its own measurements.
+
+A standard deviation is a promise: where innovations are three times larger than stated, or follow one another with one
+sign, it is not kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.evaluation.documents import CoverageFigures
+from polyins.evaluation.figures import Epochs, Figures
+from polyins.evaluation.outages import partly_covered
+from polyins.model.findings import Finding, Severity, Verdict
+from polyins.model.solution import Innovations, Solution
+
+Array = NDArray[np.float64]
+
+DOUBTFUL, USELESS = 3.0, 10.0
+"""how many times larger than stated an error may be before it is doubted, and before it is not to be used"""
+LEAST = 20
+"""measurements from which a kind is judged"""
+PART = 10
+"""parts of a run of which the worst is judged: a fault need not last"""
+REJECTED_DOUBT, REJECTED_SERIOUS = 0.2, 0.7
+"""share of measurements that the gate did not take as they are"""
+CORRELATED = 0.8
+"""of neighbouring innovations, from which they tell of a bias: white ones have none"""
+LEAST_COVERAGE = 0.99
+NEGLIGIBLE_SHARE = 0.01
+NEGLIGIBLE_S = 1.0
+"""A reference may lack less than this of the epochs, and less than this of the time, without a word."""
+
+
+@dataclass(frozen=True)
+class _Statistics:
+    """Of the measurements of one kind."""
+
+    ratio: float
+    """how many times larger than stated innovations are, by their median square"""
+    worst: float
+    """the same, of the worst part"""
+    worst_from: float
+    worst_to: float
+    correlation: float
+    """of neighbours"""
+    rejected: float
+    """share"""
+
+
+def verdict(solution: Solution, figures: Figures) -> Verdict:
+    """Return what is to be said of a solution; of it only what has no row per epoch is looked at."""
+    known = (*solution.findings, *of_measurements(solution))
+    return Verdict((*known, *_of_epochs(solution, figures.epochs), *_of_reference(figures)))
+
+
+def of_measurements(solution: Solution) -> tuple[Finding, ...]:
+    """Return what the innovations of a solution say of it."""
+    return tuple(finding for kind, measured in solution.measurements.items() for finding in _of_kind(kind, measured))
+
+
+def _of_epochs(solution: Solution, epochs: Epochs) -> Iterator[Finding]:
+    if epochs.broken:
+        text = f"the solution is not finite at {epochs.broken} of {epochs.count} epochs: it diverged"
+        yield Finding("not finite", text, "serious", from_s=epochs.first, to_s=epochs.last, size=epochs.broken)
+    share = coverage(solution, epochs)["of_recording"]
+    if share is not None and share < LEAST_COVERAGE:
+        yield Finding(
+            "coverage",
+            f"the solution covers {100.0 * share:.0f} % of the recording, {epochs.first:.1f} to {epochs.last:.1f} s",
+            from_s=epochs.first,
+            to_s=epochs.last,
+            size=share,
+            expected=1.0,
+        )
+
+
+def coverage(solution: Solution, epochs: Epochs) -> CoverageFigures:
+    """Return from when to when there is a solution, and which share of the recording that is, if it is known."""
+    span = solution.recording_span
+    known = span is not None and span[1] > span[0]
+    share = min(1.0, (epochs.duration + epochs.interval) / (span[1] - span[0])) if span is not None and known else None
+    return {"from_s": epochs.first, "to_s": epochs.last, "of_recording": share}
+
+
+def _of_reference(figures: Figures) -> Iterator[Finding]:
+    """Say what of the solution the reference cannot judge."""
+    epochs, errors = figures.epochs, figures.errors
+    if errors is None:
+        return
+    share = epochs.uncovered / max(epochs.count, 1)
+    # streams hardly ever begin and end together
+    if share > NEGLIGIBLE_SHARE and share * epochs.duration >= NEGLIGIBLE_S:
+        text = (
+            f"reference: covers {epochs.count - epochs.uncovered} of {epochs.count} epochs; "
+            f"{epochs.uncovered} are left out of the errors"
+        )
+        yield Finding("reference", text, stream="reference", size=share, expected=0.0)
+    for begin, end in partly_covered(errors, figures.outages, epochs.interval):
+        text = (
+            f"outage {begin:.3f} s to {end:.3f} s: solution and reference do not cover all of it; its maximum may be"
+            " larger"
+        )
+        yield Finding("reference", text, stream="reference", from_s=begin, to_s=end)
+
+
+def _of_kind(kind: str, measured: Innovations) -> Iterator[Finding]:
+    resets = int(np.count_nonzero(measured.reopened))
+    if resets:
+        when = measured.time[measured.reopened]
+        yield Finding(
+            "reset",
+            f"{kind}: {resets} reset(s) of the state to it, the first at {when[0]:.2f} s",
+            "doubt",
+            stream=kind,
+            from_s=float(when[0]),
+            to_s=float(when[-1]),
+            size=resets,
+            expected=0,
+            remedy="what lies before each is off by as much as the state moved",
+        )
+    if measured.time.size < LEAST:
+        return
+    of = _statistics(measured)
+    severity = _severity(of.worst)
+    if severity is not None:
+        axis = _worst_axis(measured, of)
+        yield Finding(
+            "innovations",
+            f"{kind}: innovations are {of.worst:.1f} times as large as stated from {of.worst_from:.1f} to"
+            f" {of.worst_to:.1f} s, {of.ratio:.1f} times over all",
+            severity,
+            stream=kind,
+            axis=axis,
+            from_s=of.worst_from,
+            to_s=of.worst_to,
+            size=of.worst,
+            expected=1.0,
+            remedy="look at its std, its clock and its lever arm, and at the noise figures of the IMUs",
+        )
+    if of.rejected > REJECTED_DOUBT:
+        when = measured.time[~measured.accepted]
+        yield Finding(
+            "rejected",
+            f"{kind}: {100.0 * of.rejected:.0f} % of {measured.time.size} measurements were rejected",
+            "serious" if of.rejected > REJECTED_SERIOUS else "doubt",
+            stream=kind,
+            from_s=float(when[0]),
+            to_s=float(when[-1]),
+            size=of.rejected,
+            expected=0.0,
+        )
+
+
+def _severity(ratio: float) -> Severity | None:
+    return "serious" if ratio > USELESS else "doubt" if ratio > DOUBTFUL else None
+
+
+def _statistics(measured: Innovations) -> _Statistics:
+    from scipy.stats import chi2
+
+    scaled = measured.nis / chi2.ppf(0.5, np.maximum(measured.rows, 1))
+    parts = np.array_split(np.arange(scaled.size), max(1, min(PART, scaled.size // LEAST)))
+    by_part = np.array([np.sqrt(np.median(scaled[part])) for part in parts])
+    worst = parts[int(np.argmax(by_part))]
+    return _Statistics(
+        ratio=float(np.sqrt(np.median(scaled))),
+        worst=float(by_part.max()),
+        worst_from=float(measured.time[worst[0]]),
+        worst_to=float(measured.time[worst[-1]]),
+        correlation=_correlation(measured),
+        rejected=float(np.mean(~measured.accepted)),
+    )
+
+
+def _correlation(measured: Innovations) -> float:
+    """Return the correlation of neighbouring innovations, of the axis where it is largest."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scaled = np.where(measured.std > 0.0, measured.residual / measured.std, 0.0)
+    limited = np.clip(scaled, -USELESS, USELESS)
+    power = np.sum(limited**2, axis=0)
+    products = np.sum(limited[1:] * limited[:-1], axis=0)
+    return float(np.max(products / np.maximum(power, 1.0)))
+
+
+def _worst_axis(measured: Innovations, of: _Statistics) -> str | None:
+    """Return the axis along which the innovations of the worst part are largest."""
+    inside = (measured.time >= of.worst_from) & (measured.time <= of.worst_to)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scaled = np.where(measured.std > 0.0, measured.residual / measured.std, 0.0)[inside]
+    return measured.axes[int(np.argmax(np.mean(scaled**2, axis=0)))] if measured.axes else None
