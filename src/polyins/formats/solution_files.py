@@ -20,6 +20,7 @@ from polyins.model.findings import Finding, notes
 from polyins.model.geodesy import displacement
 from polyins.model.recording import usual_interval
 from polyins.model.solution import Solution, Trajectory
+from polyins.model.status import STATUSES
 from polyins.version import __version__
 
 if TYPE_CHECKING:
@@ -84,7 +85,10 @@ class SolutionWriter:
         trajectory, errors = self._files
         rows = self._rows(part.time)
         shown = part if rows is None else part.at(rows, np.arange(0))
-        trajectory.add(trajectory_columns(shown.trajectory, self._origin, part.geodetic))
+        columns: dict[str, Any] = trajectory_columns(shown.trajectory, self._origin, part.geodetic)
+        if shown.status is not None:
+            columns["status"] = status_to_arrow(shown.status)
+        trajectory.add(columns)
         errors.add(_imu_error_columns(part))
 
     def _rows(self, time: Array) -> NDArray[np.intp] | None:
@@ -141,6 +145,7 @@ def read_solution(path: Path) -> Solution:
         start=metadata.get("start", {}),
         filter_s=metadata.get("filter_s", 0.0),
         first_call_s=metadata.get("first_call_s", 0.0),
+        status=_statuses(columns),
         recording_span=None if metadata.get("recording_span") is None else tuple(metadata["recording_span"]),
         findings=findings,
     )
@@ -172,6 +177,13 @@ def arrow_columns(columns: Mapping[str, Any]) -> dict[str, pa.Array]:
     """Return columns as they are written: in single precision but for what that would round too much."""
     rows = len(columns["time_s"])
     return {name: _arrow(name, values, rows) for name, values in columns.items()}
+
+
+def status_to_arrow(status: NDArray[np.uint8]) -> pa.Array:
+    """Return what states are worth as words."""
+    import pyarrow as pa
+
+    return pa.DictionaryArray.from_arrays(to_arrow(status.astype(np.int32)), texts_to_arrow(STATUSES))
 
 
 def _named(names: tuple[str, ...], values: Array) -> dict[str, Array]:
@@ -230,13 +242,14 @@ def _parquet_writer(path: Path, schema: pa.Schema) -> Any:
     import pyarrow.parquet as pq
 
     # Numbers that never repeat gain nothing from a dictionary, but from keeping their like bytes together.
-    numbers = [name for name in schema.names if name != "imu"]
+    words = [name for name in schema.names if name in ("imu", "status")]
+    numbers = [name for name in schema.names if name not in words]
     return pq.ParquetWriter(
         path,
         schema,
         compression="zstd",
         compression_level=1,
-        use_dictionary=["imu"],
+        use_dictionary=words,
         use_byte_stream_split=numbers,
     )
 
@@ -281,6 +294,12 @@ def _position(table: pa.Table, geodetic: bool, metadata: Mapping[str, Any], path
         return np.column_stack([np.radians(degrees), height])
     origin = np.array(metadata.get("origin", [0.0, 0.0, 0.0]))
     return np.column_stack([_table(table, _LOCAL[:2], path) + origin[:2], height])
+
+
+def _statuses(table: pa.Table) -> NDArray[np.uint8] | None:
+    if "status" not in table.column_names:
+        return None
+    return np.array([STATUSES.index(word) for word in table.column("status").to_pylist()], dtype=np.uint8)
 
 
 def _read_imu_errors(path: Path, names: tuple[str, ...]) -> tuple[tuple[str, ...], Array, Array]:

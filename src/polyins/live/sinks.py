@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
+import numpy as np
+
 from polyins.errors import InputError
 from polyins.files import whole
-from polyins.formats.solution_files import arrow_columns
+from polyins.formats.solution_files import arrow_columns, status_to_arrow
 from polyins.live import nmea
 from polyins.live.snapshot import Snapshot, columns
 from polyins.live.source import address
@@ -174,6 +176,7 @@ class ParquetLog:
         first = self.pending[0]
         values = columns([snapshot.state for snapshot in self.pending], first.origin, first.geodetic)
         arrays = arrow_columns(values)
+        arrays["status"] = status_to_arrow(np.array([snapshot.status for snapshot in self.pending]))
         arrays["dead_reckoning"] = pa.array([snapshot.dead_reckoning for snapshot in self.pending])
         table = pa.table(arrays)
         if self.writer is None:

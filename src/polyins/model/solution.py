@@ -140,6 +140,8 @@ class Solution:
     """CPU time inside the compiled loop"""
     first_call_s: float = 0.0
     """time spent on compiling or loading the kernels"""
+    status: NDArray[np.uint8] | None = None
+    """what each state is worth, an index into `model.status.STATUSES`, shape (T,); None: it is not known"""
     recording_span: tuple[float, float] | None = None
     """s, s: what the IMUs of the recording cover"""
     findings: tuple[Finding, ...] = ()
@@ -172,6 +174,7 @@ class Solution:
             **{name: getattr(self, name)[epochs] for name in BY_EPOCH},
             **{name: getattr(self, name)[logs] for name in BY_LOG},
             offsets=offsets,
+            status=None if self.status is None else self.status[epochs],
             mounting=of(self.mounting),
             mounting_std=of(self.mounting_std),
         )
@@ -192,7 +195,7 @@ class Solution:
         offsets = {name: [part.offsets[name] for part in parts] for name in last.offsets}
         return replace(
             last,
-            **{name: whole(name) for name in (*BY_EPOCH, *BY_LOG, "mounting", "mounting_std")},
+            **{name: whole(name) for name in (*BY_EPOCH, *BY_LOG, "mounting", "mounting_std", "status")},
             measurements={kind: Innovations.joined(some) for kind, some in measured.items()},
             offsets={
                 name: OffsetEstimate(*(np.concatenate([getattr(one, of) for one in some]) for of in ("value", "std")))

@@ -15,8 +15,9 @@ from polyins.kernels import dense
 from polyins.model.findings import SILENT, Finding, notes
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
-from polyins.model.solution import Innovations, OffsetEstimate, Solution
+from polyins.model.solution import Innovations, OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
+from polyins.model.status import patience, status_of
 from polyins.navigate import engine, events, layout, update
 from polyins.navigate import start as search
 from polyins.navigate import state as places
@@ -29,6 +30,11 @@ from polyins.prepare.alignment import Start
 from polyins.prepare.timesync import Aligned
 
 Array = NDArray[np.float64]
+
+AIDING = (kinds.GNSS_POSITION, kinds.WHEEL_SPEED, kinds.ODOMETER)
+"""kinds without which a run coasts"""
+USUAL_AIDING = 6
+"""latest of them that tell how often they usually come"""
 
 CHUNK = 4000
 """Epochs between two calls of `progress`."""
@@ -51,6 +57,8 @@ class Prepared:
     outputs: Outputs
     schedule: wheels.Schedule
     """when it measures by itself after these epochs"""
+    aided: list[float]
+    """s: the latest times at which a position or a speed was accepted before these epochs, or the start"""
     full_matrices: tuple[Array, Array] | None = None
     """work arrays of the dense covariance"""
     loop: Callable[..., None] = engine.run
@@ -188,6 +196,7 @@ def lay_out(
         inputs=Inputs(nothing, nothing, nothing, nothing, *events.merged()),
         outputs=Outputs(nothing, nothing, nothing, nothing, nothing, nothing),
         schedule=schedule_of(choice, recording, start),
+        aided=[start.time],
     )
     inputs = inputs_of(run, aligned, float(aligned.time[0]))
     engine.begin(navigators, inputs.increments[0], interval)
@@ -263,12 +272,7 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
     """Return what a run has written, as a solution."""
     recording, aligned, outputs = run.recording, run.aligned, run.outputs
     states, variances = outputs.states[1:], outputs.variances[1:]
-    point = recording.rig.imus[0].position if run.method.bank == "one" and not recording.rig.has_wheels else np.zeros(3)
-    lanes = run.bank.lanes
-    log = outputs.log[:, :, :, lanes].transpose(0, 1, 3, 2)
-    return Solution(
-        method=run.method.name,
-        geodetic=recording.geodetic,
+    track = Trajectory(
         time=aligned.time[1:],
         position=states[:, 0:3],
         velocity=states[:, 3:6],
@@ -276,6 +280,14 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         position_variance=variances[:, 0:3],
         velocity_variance=variances[:, 3:6],
         phi_covariance=variances[:, 6:12],
+    )
+    point = recording.rig.imus[0].position if run.method.bank == "one" and not recording.rig.has_wheels else np.zeros(3)
+    lanes = run.bank.lanes
+    log = outputs.log[:, :, :, lanes].transpose(0, 1, 3, 2)
+    return Solution(
+        method=run.method.name,
+        geodetic=recording.geodetic,
+        **track._asdict(),
         point=point,
         imus=len(recording.rig.imus),
         imu_names=tuple(run.bank.members[i].imu.name for i in lanes),
@@ -289,6 +301,7 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,
+        status=_status(run, track),
         recording_span=_span(recording),
         findings=(
             *notes(recording.warnings),
@@ -296,6 +309,17 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
             *(silences(run.choice, recording, aligned) if recording.rig.has_wheels else ()),
         ),
     )
+
+
+def _status(run: Prepared, track: Trajectory) -> NDArray[np.uint8]:
+    """Return what each state is worth, and note when the run was aided last."""
+    kind, taken = run.inputs.event_kind, run.outputs.event_status
+    believed = np.isin(kind, AIDING) & np.isin(taken, (update.ACCEPTED, update.REOPENED))
+    times = np.concatenate([run.aided, run.inputs.event_time[believed]])
+    last = np.maximum(np.searchsorted(times, track.time + run.recording.options.gnss_snap, "right") - 1, 0)
+    found = status_of(track, times[last], patience(np.diff(times)))
+    run.aided[:] = times[-USUAL_AIDING:]
+    return found
 
 
 def _span(recording: Recording) -> tuple[float, float] | None:
