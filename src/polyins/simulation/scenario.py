@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +88,7 @@ class WrongFixes(Section):
 class Fixes(Section):
     """The GNSS receiver."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {"antenna_position": "antenna"}
     rate_hz: Positive = 1.0
     """fixes per second"""
     phase_s: NotNegative = 0.3012
