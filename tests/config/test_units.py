@@ -17,7 +17,7 @@ from polyins.model.recording import FilterOptions, RollingOptions, StandstillOpt
 from polyins.model.rig import DEG, AidingSensor, Imu, ImuErrors, NoiseGrade, Wheel
 from polyins.simulation.drive_scenario import Drive, ReplayedDrive
 from polyins.simulation.error_scenario import SensorErrors
-from polyins.simulation.gnss import Receiver
+from polyins.simulation.gnss import GnssReceiver
 from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.path import Driving
 from polyins.simulation.replay import Ride
@@ -206,7 +206,7 @@ OTHERWISE: dict[str, set[str]] = {
         (SensorErrors, Imperfections),
         (Drive, Driving),
         (ReplayedDrive, Ride),
-        (Fixes, Receiver),
+        (Fixes, GnssReceiver),
     ],
 )
 def test_every_field_has_a_key_and_every_key_reaches_one(section, kind):

@@ -3,7 +3,7 @@ from curves import Line
 from pymap3d import geodetic2ned
 
 from polyins.model.attitude import quaternions, rotation_matrices
-from polyins.simulation.gnss import Receiver, fixes, with_wrong_fixes
+from polyins.simulation.gnss import GnssReceiver, fixes, with_wrong_fixes
 from polyins.simulation.increments import increments
 from polyins.simulation.path import Profile, drive, path
 from polyins.simulation.plane import Plane
@@ -53,7 +53,7 @@ def test_plane_and_earth_agree_on_the_shape_of_a_short_drive():
 
 def test_fixes_and_lies_are_in_metres():
     drawn = drive(100.0, static=10.0, seed=4, start=ORIGIN, world=Plane())
-    stream = fixes(drawn, Receiver(np.zeros(3), np.ones(3)), np.random.default_rng(0))
+    stream = fixes(drawn, GnssReceiver(np.zeros(3), np.ones(3)), np.random.default_rng(0))
     off = stream.position - drawn.truth(stream.time).position
     assert 0.8 < off.std() < 1.2
     lying, chosen = with_wrong_fixes(stream, np.arange(50, 90), 5, 30.0, np.random.default_rng(1), drawn.world)

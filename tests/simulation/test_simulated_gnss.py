@@ -3,7 +3,7 @@ import pytest
 from pymap3d import geodetic2ned
 
 from polyins.errors import InputError
-from polyins.simulation.gnss import Receiver, fixes, with_wrong_fixes
+from polyins.simulation.gnss import GnssReceiver, fixes, with_wrong_fixes
 from polyins.simulation.path import drive
 
 DRIVE = drive(200.0, static=20.0, seed=1)
@@ -12,7 +12,7 @@ ANTENNA = np.array([-0.3, 0.2, -1.0])
 
 def received(path, seed, position_std, **others):
     spread = {name: np.broadcast_to(std, 3) for name, std in others.items() if name.endswith("_std")}
-    receiver = Receiver(ANTENNA, np.broadcast_to(position_std, 3), **(others | spread))
+    receiver = GnssReceiver(ANTENNA, np.broadcast_to(position_std, 3), **(others | spread))
     return fixes(path, receiver, np.random.default_rng(seed))
 
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Receiver:
+class GnssReceiver:
     """A GNSS receiver: where its antenna is, when its fixes come and how good they are."""
 
     antenna: Vector
@@ -39,7 +39,7 @@ class Receiver:
     """time of the first fix, s"""
 
 
-def fixes(path: Path, receiver: Receiver, rng: np.random.Generator) -> GnssStream:
+def fixes(path: Path, receiver: GnssReceiver, rng: np.random.Generator) -> GnssStream:
     """Return the fixes of a receiver on a path."""
     rate, phase = receiver.rate, receiver.phase
     time = phase + np.arange(int(np.floor((path.duration - phase) * rate + 1e-9)) + 1) / rate

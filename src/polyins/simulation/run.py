@@ -274,7 +274,7 @@ def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[
     if scenario.gnss is None:
         return None, np.zeros(0, dtype=np.intp)
     receiver = scenario.gnss
-    stream = gnss.fixes(path, read(receiver, gnss.Receiver), rng)
+    stream = gnss.fixes(path, read(receiver, gnss.GnssReceiver), rng)
     shown = stream.time > scenario.static_s
     for begin, end in scenario.outage_intervals():
         shown &= (stream.time < begin) | (stream.time > end)
