@@ -22,6 +22,7 @@ from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.path import Driving
 from polyins.simulation.replay import Ride
 from polyins.simulation.scenario import Fixes
+from polyins.simulation.wheel_scenario import WheelModule
 
 positive = st.floats(1e-9, 1e3)
 share = st.floats(0.0, 1.0)
@@ -165,6 +166,7 @@ def test_defaults_are_the_models(section, kind):
 ELSEWHERE: dict[str, set[str]] = {
     "FilterOptions": {"nonholonomic"},
     "Imu": {"rotation"},
+    "Wheel": {"steering", "radius_std", "lever_arm_std"},
     "AidingSensor": {"kind", "offset_random_walk"},
 }
 """fields that no key of a section gives by itself: they follow from several, or from which section it is"""
@@ -175,6 +177,7 @@ OTHERWISE: dict[str, set[str]] = {
         "format", "columns", "rate_hz", "clock_offset_s", "time_offset", "gyro_range_deg_s", "axes", "mount_deg", "file"
     },
     "Fixes": {"lies"},
+    "WheelModule": {"name", "position_m", "chips", "calibrated", "slip"},
     "ReplayedDrive": {"file", "from_s", "to_s", "position_std_m"},
     "SensorErrors": {"vibration_m_s2", "common_noise_share", "common_drift_share"},
     **{
@@ -207,6 +210,7 @@ OTHERWISE: dict[str, set[str]] = {
         (Drive, Driving),
         (ReplayedDrive, Ride),
         (Fixes, GnssReceiver),
+        (WheelModule, Wheel),
     ],
 )
 def test_every_field_has_a_key_and_every_key_reaches_one(section, kind):

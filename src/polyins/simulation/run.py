@@ -24,7 +24,7 @@ from polyins.model.recording import (
     RollingOptions,
     StartOptions,
 )
-from polyins.model.rig import DEG, Imu, NoiseGrade
+from polyins.model.rig import Imu, NoiseGrade
 from polyins.simulation import gnss
 from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Road
@@ -257,15 +257,13 @@ def _start(scenario: Scenario, run: TrueRun) -> StartOptions:
         return StartOptions(static_interval=interval, heading=float(truth.attitude[0, 2]), heading_from="value")
     if not scenario.wheels or scenario.gnss:
         return StartOptions(static_interval=interval)
-    std = scenario.start_std
-    return StartOptions(
+    return read(
+        scenario.start_std,
+        StartOptions,
         static_interval=interval,
         position=truth.position[0],
         heading=float(truth.attitude[0, 2]),
         heading_from="value",
-        position_std=np.array(std.position_m),
-        velocity_std=np.array(std.velocity_m_s),
-        attitude_std=np.array(std.attitude_deg) * DEG,
     )
 
 

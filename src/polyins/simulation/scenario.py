@@ -112,6 +112,7 @@ class Fixes(Section):
 class StartStd(Section):
     """How sure a start that the truth gives claims to be, 1 sigma; paper B's lab starts like that."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {name: f"{name}_std" for name in ("position", "velocity", "attitude")}
     position_m: Spread = (0.05, 0.05, 0.05)
     """north, east, down, m"""
     velocity_m_s: Spread = (0.05, 0.05, 0.05)

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from polyins.config import NotNegative, Number, Positive, Section, Triple
 from polyins.config.fields import blame
+from polyins.config.units import read
 from polyins.formats.columns import column_names, read_columns
 from polyins.model.rig import DEG, Imu, NoiseGrade, Wheel
 from polyins.simulation import earth
@@ -64,7 +65,7 @@ class WheelModule(Section):
 
     def imus(self, grade: NoiseGrade) -> list[Imu]:
         """Return the module's IMUs."""
-        wheel = Wheel(self.radius_m, np.array(self.lever_arm_m))
+        wheel = read(self, Wheel)
         return [
             Imu(f"{self.name}{number}", grade, position=np.array(self.position_m), wheel=wheel, module=self.name)
             for number in range(1, self.chips + 1)
