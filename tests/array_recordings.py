@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import FilterOptions, GnssStream, ImuStream, Recording, Reference, StartOptions
 from polyins.model.rig import DEG, Imu, ImuErrors, NoiseGrade, Rig
 from polyins.simulation.increments import increments
-from polyins.simulation.path import START, Path, path
+from polyins.simulation.path import START, Path, Profile, path
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Swing:
         return np.asarray(line + wave)
 
 
-def shaken_path(duration: float, **changes: Any) -> Path:
+def shaken_path(duration: float, *, start: ArrayLike = START, **changes: Any) -> Path:
     """Roll, pitch, heading and speed swing at rates of up to 1 rad/s; each can be replaced."""
     curves = {
         "speed": Swing(12.0, 0.0, 4.0, 0.9),
@@ -52,7 +52,7 @@ def shaken_path(duration: float, **changes: Any) -> Path:
         "pitch": Swing(-0.05, 0.0, 0.2, 3.1),
         "heading": Swing(2.5, 0.3, 0.4, 1.7),
     }
-    return path(**(curves | {"duration": duration} | changes))
+    return path(Profile(**(curves | changes)), duration=duration, start=start)
 
 
 def scaled(noise: NoiseGrade, factor: float) -> NoiseGrade:

@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any, Literal
 
-from polyins.config import Noise
 from polyins.simulation.scenario import Scenario, SensorErrors
 from polyins.simulation.wheel_scenario import Laps, Slip, SurveyedTrack
 from polyins.studies.scenario_files import read, scenarios
@@ -45,21 +44,20 @@ class Vehicle:
         *,
         level: bool = False,
         earth: Earth | None = None,
-        noise: Noise | None = None,
         errors: SensorErrors | None = None,
         slip: Slip | None = None,
         duration_s: float | None = None,
     ) -> Scenario:
         """Return the scenario on the data set's track, or on its own laps.
 
-        `folder`: of the data set; without it laps are driven. `level`: the ground has no slopes. `noise`: how good the
-        chips are; `errors`: which errors they have; `slip`: of both wheels; `duration_s`: how long it drives at most;
-        those of the file unless given. The filter knows the radius that fits each chip's gyro.
+        `folder`: of the data set; without it laps are driven. `level`: the ground has no slopes. `errors`: which errors
+        the chips have; `slip`: of both wheels; `duration_s`: how long it drives at most; those of the file unless
+        given. The filter knows the radius that fits each chip's gyro.
         """
         way: dict[str, Any] = {"track": self._track(folder) if folder else None, "laps": None if folder else self.laps}
         if level:
             way = {key: ground and ground.model_copy(update={"slope_deg": 0.0}) for key, ground in way.items()}
-        given: dict[str, Any] = {"earth": earth, "noise": noise, "errors": errors, "duration_s": duration_s}
+        given: dict[str, Any] = {"earth": earth, "errors": errors, "duration_s": duration_s}
         if slip:
             given["wheels"] = tuple(wheel.model_copy(update={"slip": slip}) for wheel in self.base.wheels)
         changed = {key: value for key, value in given.items() if value is not None}

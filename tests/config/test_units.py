@@ -17,9 +17,12 @@ from polyins.model.recording import FilterOptions, RollingOptions, StandstillOpt
 from polyins.model.rig import DEG, AidingSensor, Imu, ImuErrors, NoiseGrade, Wheel
 from polyins.simulation.drive_scenario import Drive, ReplayedDrive
 from polyins.simulation.error_scenario import SensorErrors
+from polyins.simulation.gnss import GnssReceiver
 from polyins.simulation.imu_errors import Imperfections
 from polyins.simulation.path import Driving
 from polyins.simulation.replay import Ride
+from polyins.simulation.scenario import Fixes
+from polyins.simulation.wheel_scenario import WheelModule
 
 positive = st.floats(1e-9, 1e3)
 share = st.floats(0.0, 1.0)
@@ -163,6 +166,7 @@ def test_defaults_are_the_models(section, kind):
 ELSEWHERE: dict[str, set[str]] = {
     "FilterOptions": {"nonholonomic"},
     "Imu": {"rotation"},
+    "Wheel": {"steering", "radius_std", "lever_arm_std"},
     "AidingSensor": {"kind", "offset_random_walk"},
 }
 """fields that no key of a section gives by itself: they follow from several, or from which section it is"""
@@ -172,6 +176,8 @@ OTHERWISE: dict[str, set[str]] = {
     "ImuEntry": {
         "format", "columns", "rate_hz", "clock_offset_s", "time_offset", "gyro_range_deg_s", "axes", "mount_deg", "file"
     },
+    "Fixes": {"lies"},
+    "WheelModule": {"name", "position_m", "chips", "calibrated", "slip"},
     "ReplayedDrive": {"file", "from_s", "to_s", "position_std_m"},
     "SensorErrors": {"vibration_m_s2", "common_noise_share", "common_drift_share"},
     **{
@@ -203,6 +209,8 @@ OTHERWISE: dict[str, set[str]] = {
         (SensorErrors, Imperfections),
         (Drive, Driving),
         (ReplayedDrive, Ride),
+        (Fixes, GnssReceiver),
+        (WheelModule, Wheel),
     ],
 )
 def test_every_field_has_a_key_and_every_key_reaches_one(section, kind):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from polyins.model.recording import ImuStream
-from polyins.simulation.imu_errors import Imperfections, corrupt, draw_errors
+from polyins.simulation.imu_errors import Imperfections, TrueIncrements, corrupt, draw_errors
 from polyins.simulation.run import record, true_run
 from polyins.simulation.scenario import Scenario
 from polyins.studies import chips, rigid_array, split
@@ -59,7 +59,7 @@ def test_a_calibration_takes_off_what_the_simulation_put_on() -> None:
     faults = Imperfections(noise=False, biases=False, scales=False, chips=tuple(chip.chip() for chip in entry))
     silent = faults.limit(grade)
     errors = draw_errors(2.0, silent, faults, rng)
-    raw = corrupt(time, rate * 0.01, force * 0.01, errors, silent, rng, imperfections=faults)
+    raw = corrupt(TrueIncrements(time, rate * 0.01, force * 0.01), errors, silent, rng, imperfections=faults)
     assert np.abs(raw[1] - force * 0.01).max() > 1e-4
     corrected = chips.compensate(ImuStream("chip", time, *raw), entry[0])
     np.testing.assert_allclose(corrected.dtheta, rate * 0.01, atol=1e-12)

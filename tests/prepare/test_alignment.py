@@ -20,7 +20,7 @@ from polyins.prepare import alignment
 from polyins.prepare.alignment import Start, find_standstill, find_start, level, rotation_matrix
 from polyins.prepare.timesync import align
 from polyins.simulation.increments import increments
-from polyins.simulation.path import START, Path, path, smooth_steps
+from polyins.simulation.path import START, Path, Profile, path, smooth_steps
 
 Array = NDArray[np.float64]
 
@@ -188,10 +188,12 @@ def step(before: float, after: float, begin: float, end: float, last: float = 1e
 def leaving(at: float, *, turn: float = 0.0, duration: float = 25.0, start: Array = PLACE) -> Path:
     """Stands at 30 deg of heading, turns on the spot in the two seconds before `at`, then leaves."""
     return path(
-        step(0.0, 6.0, at, at + 3.0),
-        step(0.02, 0.02, 1.0, 2.0),
-        step(0.03, 0.03, 1.0, 2.0),
-        step(30.0 * DEG, 30.0 * DEG + turn, at - 2.0, at),
+        Profile(
+            step(0.0, 6.0, at, at + 3.0),
+            step(0.02, 0.02, 1.0, 2.0),
+            step(0.03, 0.03, 1.0, 2.0),
+            step(30.0 * DEG, 30.0 * DEG + turn, at - 2.0, at),
+        ),
         duration=duration,
         start=start,
     )
@@ -242,7 +244,7 @@ def test_less_than_three_seconds_are_no_standstill() -> None:
 
 def test_a_steady_straight_drive_is_no_standstill_when_gnss_says_that_it_moves() -> None:
     """To the IMUs it is one: without GNSS nothing tells them apart."""
-    steady = path(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.0), duration=20.0)
+    steady = path(Profile(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.0)), duration=20.0)
     recording = drive_of(steady)
     assert standstill_of(recording, with_gnss=False) is not None
     assert standstill_of(recording) is None
@@ -253,14 +255,14 @@ def test_a_steady_straight_drive_is_no_standstill_when_gnss_says_that_it_moves()
 
 def test_a_standstill_later_in_the_recording_is_used() -> None:
     """Driving first: the run starts where the array stops."""
-    arriving = path(step(6.0, 0.0, 5.0, 9.0), Swing(0.0), Swing(0.0), Swing(1.0), duration=25.0)
+    arriving = path(Profile(step(6.0, 0.0, 5.0, 9.0), Swing(0.0), Swing(0.0), Swing(1.0)), duration=25.0)
     begin, end = standstill_of(drive_of(arriving)) or (np.nan, np.nan)
     assert begin >= 8.0
     assert end > 20.0
 
 
 def test_shaking_on_the_spot_is_no_standstill() -> None:
-    shaken = path(Swing(0.0), Swing(0.0, 0.0, 0.05, 9.0), Swing(0.0), Swing(1.0), duration=10.0)
+    shaken = path(Profile(Swing(0.0), Swing(0.0, 0.0, 0.05, 9.0), Swing(0.0), Swing(1.0)), duration=10.0)
     assert standstill_of(drive_of(shaken)) is None
 
 
@@ -303,7 +305,7 @@ def test_a_gyro_bias_does_not_turn_the_heading() -> None:
 @pytest.mark.parametrize("time", [None, 5.25], ids=["first-fix", "later"])
 def test_a_start_in_motion_levels_and_heads_by_gnss(time: float | None) -> None:
     """A steady turn: without the acceleration that GNSS sees, the roll would be wrong by six degrees."""
-    turning = path(Swing(10.0), Swing(0.02), Swing(-0.03), Swing(-2.0, 0.1), duration=20.0)
+    turning = path(Profile(Swing(10.0), Swing(0.02), Swing(-0.03), Swing(-2.0, 0.1)), duration=20.0)
     start = found(replace(drive_of(turning), start=StartOptions(time=time)))
     truth = turning.truth(np.array([start.time]))
     assert start.sources["roll_pitch"].startswith("levelled in motion")
@@ -314,7 +316,7 @@ def test_a_start_in_motion_levels_and_heads_by_gnss(time: float | None) -> None:
 
 
 def test_a_course_due_south_is_no_obstacle() -> None:
-    steady = path(Swing(10.0), Swing(0.0), Swing(0.0), Swing(np.pi, 0.0, 0.02, 1.0), duration=20.0)
+    steady = path(Profile(Swing(10.0), Swing(0.0), Swing(0.0), Swing(np.pi, 0.0, 0.02, 1.0)), duration=20.0)
     start = found(drive_of(steady))
     assert off_by(start.attitude[2], steady.truth(np.array([start.time])).attitude[0, 2]) < 1.0
 
@@ -343,7 +345,7 @@ def test_the_antimeridian_between_two_fixes_is_no_obstacle() -> None:
 
 
 def test_a_start_on_the_antimeridian_is_between_its_fixes() -> None:
-    steady = path(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5), duration=20.0)
+    steady = path(Profile(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5)), duration=20.0)
     recording = drive_of(steady)
     assert recording.gnss is not None
     time = 5.25
@@ -430,7 +432,7 @@ def lying_at(which: list[int], recording: Recording, metres_north: float = 50.0)
 @pytest.mark.parametrize("given", [{"heading": 1.5}, {}], ids=["first-fix", "fix-in-motion"])
 @pytest.mark.parametrize("lie", [0, 1, 2, 3])
 def test_a_start_in_motion_is_not_where_a_lie_is(lie: int, given: dict[str, Any]) -> None:
-    steady = path(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5), duration=20.0)
+    steady = path(Profile(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5)), duration=20.0)
     recording = replace(drive_of(steady), start=StartOptions(**given))
     start = found(lying_at([lie], recording))
     truth = steady.truth(np.array([start.time]))
@@ -452,8 +454,8 @@ def test_a_start_at_rest_is_not_where_a_lie_is(lie: int) -> None:
 
 def test_fixes_that_tell_the_truth_are_taken_as_they_are() -> None:
     """Full braking, a fix each second: the median of five is far from the fix, and the fix is right."""
-    braking = path(smooth_steps(np.array([-1.0, 1.0, 7.0, 1e3]), np.array([30.0, 30.0, 2.0, 2.0])), Swing(0.0),
-                   Swing(0.0), Swing(1.5), duration=20.0)  # fmt: skip
+    braking = path(Profile(smooth_steps(np.array([-1.0, 1.0, 7.0, 1e3]), np.array([30.0, 30.0, 2.0, 2.0])), Swing(0.0),
+                   Swing(0.0), Swing(1.5)), duration=20.0)  # fmt: skip
     recording = drive_of(braking)
     assert recording.gnss is not None
     every = slice(None, None, 2)
@@ -467,7 +469,7 @@ def test_fixes_that_tell_the_truth_are_taken_as_they_are() -> None:
 
 def test_a_start_waits_for_the_first_fix_within_the_imus() -> None:
     """Between two fixes the position is off by what the vehicle accelerates there."""
-    speeding = path(Swing(5.0, 3.0), Swing(0.0), Swing(0.0), Swing(1.5), duration=20.0)
+    speeding = path(Profile(Swing(5.0, 3.0), Swing(0.0), Swing(0.0), Swing(1.5)), duration=20.0)
     recording = drive_of(speeding)
     imu = recording.imus[0]
     late = ImuStream(imu.name, imu.time[120:], imu.dtheta[120:], imu.dvel[120:])
@@ -483,7 +485,7 @@ def test_a_start_waits_for_the_first_fix_within_the_imus() -> None:
 @pytest.mark.parametrize("rate_hz", [1.0, 10.0])
 def test_positions_of_a_reference_in_coarse_steps_give_a_velocity(rate_hz: float) -> None:
     """Steps of a decimetre at 10 Hz make half a metre per second of the difference of neighbours."""
-    steady = path(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5), duration=20.0)
+    steady = path(Profile(Swing(10.0), Swing(0.0), Swing(0.0), Swing(1.5)), duration=20.0)
     recording = drive_of(steady)
     time = np.arange(0.3, 20.0, 1.0 / rate_hz)
     at = steady.truth(time)
@@ -555,8 +557,9 @@ def test_a_heading_from_what_is_missing_is_refused(wanted: str) -> None:
 
 
 def test_motion_without_gnss_has_no_velocity() -> None:
-    recording = replace(drive_of(path(Swing(5.0), Swing(0.0, 0.0, 0.2, 3.0), Swing(0.0), Swing(1.0), duration=9.0)),
-                        gnss=None, start=StartOptions(heading=1.0, position=PLACE))  # fmt: skip
+    rolling = Profile(Swing(5.0), Swing(0.0, 0.0, 0.2, 3.0), Swing(0.0), Swing(1.0))
+    recording = replace(drive_of(path(rolling, duration=9.0)), gnss=None,
+                        start=StartOptions(heading=1.0, position=PLACE))  # fmt: skip
     with pytest.raises(InputError, match=r"no velocity; expected GNSS, a standstill, or start\.velocity_m_s"):
         found(recording)
 

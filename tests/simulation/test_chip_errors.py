@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from polyins.errors import InputError
 from polyins.model.rig import DEG, HOUR, NoiseGrade
 from polyins.simulation.error_scenario import ChipCalibration, SensorErrors
-from polyins.simulation.imu_errors import Imperfections, corrupt, draw_errors
+from polyins.simulation.imu_errors import Imperfections, TrueIncrements, corrupt, draw_errors
 from polyins.simulation.run import simulate
 from polyins.simulation.sampling import jittered, rounded
 from polyins.simulation.scenario import Board, Scenario
@@ -38,7 +38,7 @@ def measured(imperfections, *, seed=5, shared=None, vibration=None, truth=(DTHET
     errors = draw_errors(TIME[-1], GRADE, imperfections, rng, shared=shared, number=number)
     white = imperfections.limit(GRADE)
     return errors, *corrupt(
-        TIME, *truth, errors, white, rng, imperfections=imperfections, shared=shared, vibration=vibration
+        TrueIncrements(TIME, *truth, vibration), errors, white, rng, imperfections=imperfections, shared=shared
     )
 
 

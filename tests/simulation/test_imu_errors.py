@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from polyins.model.rig import NoiseGrade
-from polyins.simulation.imu_errors import Imperfections, TrueErrors, corrupt, draw_errors, gauss_markov
+from polyins.simulation.imu_errors import Imperfections, TrueErrors, TrueIncrements, corrupt, draw_errors, gauss_markov
 
 GRADE = NoiseGrade.from_datasheet(
     angle_random_walk_deg_sqrt_h=[0.2, 0.3, 0.4],
@@ -34,7 +34,7 @@ def test_the_filter_s_correction_takes_bias_and_scale_off(seed, share):
     rng = np.random.default_rng(seed)
     dtheta, dvel = true_increments(seed)
     errors = draw_errors(20.0, GRADE, Imperfections(turn_on_share=share), rng)
-    measured_dtheta, measured_dvel = corrupt(TIME, dtheta, dvel, errors, SILENT, rng)
+    measured_dtheta, measured_dvel = corrupt(TrueIncrements(TIME, dtheta, dvel), errors, SILENT, rng)
     gyro_bias, accel_bias, gyro_scale, accel_scale = np.split(errors.at(TIME - 0.0025), 4, axis=1)
     np.testing.assert_allclose((measured_dtheta - gyro_bias * 0.005) / (1 + gyro_scale), dtheta, atol=1e-15)
     np.testing.assert_allclose((measured_dvel - accel_bias * 0.005) / (1 + accel_scale), dvel, atol=1e-15)
@@ -45,7 +45,7 @@ def test_white_noise_has_the_grade_s_random_walk():
     rng, time = np.random.default_rng(1), np.arange(1, 200_001) / 200.0
     still, none = np.zeros((time.size, 3)), Imperfections(biases=False, scales=False)
     errors = draw_errors(1000.0, GRADE, none, rng)
-    dtheta, dvel = corrupt(time, still, still, errors, none.limit(GRADE), rng)
+    dtheta, dvel = corrupt(TrueIncrements(time, still, still), errors, none.limit(GRADE), rng)
     # the relative std of a std estimate from 200,000 samples is 0.16 %
     np.testing.assert_allclose(dtheta.std(axis=0) / np.sqrt(0.005), GRADE.angle_random_walk, rtol=0.008)
     np.testing.assert_allclose(dvel.std(axis=0) / np.sqrt(0.005), GRADE.velocity_random_walk, rtol=0.008)
@@ -88,7 +88,7 @@ def test_switches_silence_their_error_and_leave_the_others():
         dtheta, dvel = true_increments(3)
         imperfections = Imperfections(misalignment_std=0.001, **switches)
         errors = draw_errors(20.0, GRADE, imperfections, rng)
-        return errors, np.hstack(corrupt(TIME, dtheta, dvel, errors, imperfections.limit(GRADE), rng))
+        return errors, np.hstack(corrupt(TrueIncrements(TIME, dtheta, dvel), errors, imperfections.limit(GRADE), rng))
 
     everything, measured = drawn()
     no_biases, _ = drawn(biases=False)
@@ -107,7 +107,9 @@ def test_misalignment_turns_before_scale_and_bias():
     series = np.tile(np.repeat([1e-3, 2e-2, 1e-2, -2e-2], 3), (2, 1))
     errors = TrueErrors(np.array([0.0, 100.0]), series, gyro_turn, accel_turn)
     dtheta, dvel = true_increments(4)
-    measured_dtheta, measured_dvel = corrupt(TIME, dtheta, dvel, errors, SILENT, np.random.default_rng(0))
+    measured_dtheta, measured_dvel = corrupt(
+        TrueIncrements(TIME, dtheta, dvel), errors, SILENT, np.random.default_rng(0)
+    )
     # sensor axes turned by r see a fixed vector turned by -r
     turned = Rotation.from_rotvec(-gyro_turn).apply(dtheta)
     np.testing.assert_allclose(measured_dtheta, 1.01 * turned + 1e-3 * 0.005, atol=1e-16)
@@ -120,7 +122,7 @@ def test_errors_in_array_axes_explain_what_a_reader_returns():
     rng = np.random.default_rng(5)
     dtheta, dvel = true_increments(5)
     errors = draw_errors(20.0, GRADE, Imperfections(), rng)
-    measured = corrupt(TIME, dtheta @ C_ab, dvel @ C_ab, errors, SILENT, rng)
+    measured = corrupt(TrueIncrements(TIME, dtheta @ C_ab, dvel @ C_ab), errors, SILENT, rng)
     gyro_bias, accel_bias, gyro_scale, accel_scale = np.split(errors.in_array_axes(TIME - 0.0025, C_ab), 4, axis=1)
     np.testing.assert_allclose(measured[0] @ C_ab.T, (1 + gyro_scale) * dtheta + gyro_bias * 0.005, atol=1e-16)
     np.testing.assert_allclose(measured[1] @ C_ab.T, (1 + accel_scale) * dvel + accel_bias * 0.005, atol=1e-15)

@@ -9,7 +9,7 @@ from scipy.special import jv
 from polyins.model.attitude import quaternions, rotation_matrices
 from polyins.simulation import earth
 from polyins.simulation.increments import increments
-from polyins.simulation.path import drive, path
+from polyins.simulation.path import Profile, drive, path
 
 # interpreted, a mechanization of 1,000 s takes minutes
 DURATION = 100.0 if numba.config.DISABLE_JIT else 1000.0
@@ -50,7 +50,7 @@ def test_mechanized_increments_return_to_the_path(point, mount_deg):
 
 def test_a_body_that_slips_sideways_returns_to_its_path_too():
     slipping = path(
-        Line(8.0), Sine(0.1, 0.5), Sine(0.05, 0.3, 1.0), Line(0.3, 0.1), duration=60.0, side_speed=Sine(1.5, 0.4)
+        Profile(Line(8.0), Sine(0.1, 0.5), Sine(0.05, 0.3, 1.0), Line(0.3, 0.1), Sine(1.5, 0.4)), duration=60.0
     )
     miss, velocity, angle = mechanized(slipping, 200.0, (0.3, -0.3, 0.26))
     assert miss < 5e-4
@@ -72,7 +72,7 @@ def test_what_is_left_is_the_mechanization_s_own_error():
 @pytest.mark.parametrize("latitude", [-0.9, 0.0, 0.5, 1.2])
 def test_a_standing_imu_feels_gravity_and_the_earth_s_rate(latitude):
     position = np.array([[latitude, 1.0, 300.0]])
-    standing = path(Line(), *map(Line, ATTITUDE), duration=1.0, start=position[0])
+    standing = path(Profile(Line(), *map(Line, ATTITUDE)), duration=1.0, start=position[0])
     exact = increments(standing, 100.0)
     rate = earth.ROTATION_RATE * np.array([np.cos(latitude), 0.0, -np.sin(latitude)])
     np.testing.assert_allclose(exact.dtheta, np.tile(C_NB.T @ rate * 0.01, (100, 1)), rtol=1e-12, atol=1e-18)
@@ -83,7 +83,7 @@ def test_a_standing_imu_feels_gravity_and_the_earth_s_rate(latitude):
 def test_a_turntable_at_the_pole_turns_at_a_constant_rate():
     # table and earth turn about the same vertical, so the rate in b and the centripetal force are constant
     roll, pitch, rate, point = 0.3, -0.2, 4.0, np.array([0.5, -0.2, 0.1])
-    table = path(Line(), Line(roll), Line(pitch), Line(0.0, rate), duration=2.0, start=NORTH_POLE)
+    table = path(Profile(Line(), Line(roll), Line(pitch), Line(0.0, rate)), duration=2.0, start=NORTH_POLE)
     exact = increments(table, 200.0)
     down = rotation_matrices(quaternions(np.array([[roll, pitch, 0.0]])))[0, 2]
     turning = (rate - earth.ROTATION_RATE) * down
@@ -96,7 +96,7 @@ def test_a_turntable_at_the_pole_turns_at_a_constant_rate():
 
 
 def test_changing_rate_pushes_along_the_tangent():
-    swinging = path(Line(), Line(), Line(), Sine(0.5, 3.0), duration=2.0)
+    swinging = path(Profile(Line(), Line(), Line(), Sine(0.5, 3.0)), duration=2.0)
     exact = increments(swinging, 200.0)
     gained = exact.at([1.0, 0.0, 0.0])[1] - exact.dvel
     ends = np.arange(401) / 200.0
@@ -107,7 +107,7 @@ def test_coning_drifts_as_bessel_s_function_says():
     # roll = a sin, pitch = a cos: the z axis turns on average by a w J1(a), and sees the earth by J0(sqrt(2) a)
     amplitude, rate, latitude = 0.05, 2.0 * np.pi * 8.0, 0.5
     roll, pitch = Sine(amplitude, rate), Sine(amplitude, rate, np.pi / 2)
-    coning = path(Line(), roll, pitch, Line(), duration=1.0, start=(latitude, 0.0, 0.0))
+    coning = path(Profile(Line(), roll, pitch, Line()), duration=1.0, start=(latitude, 0.0, 0.0))
     drift = increments(coning, 400.0).dtheta.sum(axis=0)
     earth_down = -earth.ROTATION_RATE * np.sin(latitude)
     expected = amplitude * rate * jv(1, amplitude) + earth_down * jv(0, np.sqrt(2.0) * amplitude)
@@ -117,13 +117,13 @@ def test_coning_drifts_as_bessel_s_function_says():
 def test_a_straight_drive_adds_coriolis_and_the_acceleration():
     # along the equator eastwards at constant speed: f = -(g - 2 w v - v^2 / R) down, no rate but about north
     speed = 100.0
-    straight = path(Line(speed), Line(), Line(), Line(np.pi / 2), duration=1.0, start=(0.0, 0.0, 0.0))
+    straight = path(Profile(Line(speed), Line(), Line(), Line(np.pi / 2)), duration=1.0, start=(0.0, 0.0, 0.0))
     exact = increments(straight, 100.0)
     up = earth.EQUATOR_GRAVITY - 2.0 * earth.ROTATION_RATE * speed - speed**2 / earth.SEMI_MAJOR_AXIS
     np.testing.assert_allclose(exact.dvel, np.tile([0.0, 0.0, -up / 100.0], (100, 1)), atol=1e-13)
     turn = earth.ROTATION_RATE + speed / earth.SEMI_MAJOR_AXIS
     np.testing.assert_allclose(exact.dtheta, np.tile([0.0, -turn / 100.0, 0.0], (100, 1)), atol=1e-16)
-    speeding = path(Line(0.0, 2.0), Line(), Line(), Line(np.pi / 2), duration=1.0, start=(0.0, 0.0, 0.0))
+    speeding = path(Profile(Line(0.0, 2.0), Line(), Line(), Line(np.pi / 2)), duration=1.0, start=(0.0, 0.0, 0.0))
     np.testing.assert_allclose(increments(speeding, 100.0).dvel[:, 0], 0.02, rtol=1e-9)
 
 

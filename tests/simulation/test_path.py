@@ -7,7 +7,7 @@ from pymap3d import ecef2ned, geodetic2ecef
 
 from polyins.model.attitude import rotation_matrices
 from polyins.simulation import earth
-from polyins.simulation.path import Driving, drive, path, smooth_steps
+from polyins.simulation.path import Driving, Profile, drive, path, smooth_steps
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -99,7 +99,7 @@ def test_a_point_is_off_the_origin_by_its_lever_arm():
 
 def test_a_meridian_drive_covers_the_meridian_arc():
     # from the equator, at constant speed and height, to the latitude whose arc length is speed x time
-    straight = path(Line(200.0), Line(), Line(), Line(), duration=4000.0, start=(0.0, 0.3, 0.0))
+    straight = path(Profile(Line(200.0), Line(), Line(), Line()), duration=4000.0, start=(0.0, 0.3, 0.0))
     latitude, longitude, height = straight.truth([4000.0]).position[0]
     e2, phi = earth.ECCENTRICITY_SQUARED, np.linspace(0.0, latitude, 20001)
     arc = np.trapezoid(earth.SEMI_MAJOR_AXIS * (1 - e2) / (1 - e2 * np.sin(phi) ** 2) ** 1.5, phi)

@@ -5,7 +5,7 @@ from rolled import CENTRE, LEVER_ARM, RADIUS, WORLDS, drawn, in_body, wheel
 
 from polyins.model.geodesy import metres_per_unit
 from polyins.simulation.ground import without_twist
-from polyins.simulation.path import Driving, drive, path
+from polyins.simulation.path import Driving, Profile, drive, path
 from polyins.simulation.plane import Plane
 from polyins.simulation.rolling import roll
 from polyins.simulation.slip import slip_periods
@@ -69,14 +69,16 @@ def test_velocity_and_rate_of_an_imu_are_the_derivatives_of_its_position_and_att
 
 
 def test_the_module_s_heading_is_the_vehicle_s_plus_a_right_angle_and_its_roll_the_wheel_s_angle():
-    level = path(Line(1.5), Line(), Line(), Line(0.4), duration=2.0, start=(0.0, 0.0, 0.0), world=Plane())
+    level = path(Profile(Line(1.5), Line(), Line(), Line(0.4)), duration=2.0, start=(0.0, 0.0, 0.0), world=Plane())
     rolled = roll(level, CENTRE, 0.5, phase=0.3)
     attitude = rolled.motion(np.array([0.0, 1.0])).attitude
     np.testing.assert_allclose(attitude, [[0.3, 0.0, 0.4 + np.pi / 2], [0.3 - 3.0, 0.0, 0.4 + np.pi / 2]], atol=1e-12)
 
 
 def test_a_wheel_outside_of_the_turn_turns_more():
-    turning = path(Line(1.0), Line(), Line(), Line(0.0, 0.5), duration=4.0, start=(0.0, 0.0, 0.0), world=Plane())
+    turning = path(
+        Profile(Line(1.0), Line(), Line(), Line(0.0, 0.5)), duration=4.0, start=(0.0, 0.0, 0.0), world=Plane()
+    )
     left, right = (roll(turning, (0.0, y, 0.0), 0.1) for y in (-0.2, 0.2))
     end = np.array([4.0])
     assert left.angle(end)[0] == pytest.approx(-4.0 * 1.1 / 0.1)
@@ -84,7 +86,7 @@ def test_a_wheel_outside_of_the_turn_turns_more():
 
 
 def test_pitching_on_the_spot_turns_the_axle_and_not_the_wheel():
-    nodding = path(Line(), Line(), Line(0.0, 0.2), Line(), duration=1.0, start=(0.0, 0.0, 0.0), world=Plane())
+    nodding = path(Profile(Line(), Line(), Line(0.0, 0.2), Line()), duration=1.0, start=(0.0, 0.0, 0.0), world=Plane())
     motion = roll(nodding, CENTRE, RADIUS).motion(np.array([0.0, 0.5, 1.0]))
     np.testing.assert_allclose(motion.angular_rate, 0.0, atol=1e-15)
     np.testing.assert_allclose(motion.C_nb - motion.C_nb[:1], 0.0, atol=1e-12)

@@ -3,11 +3,17 @@ import pytest
 from pymap3d import geodetic2ned
 
 from polyins.errors import InputError
-from polyins.simulation.gnss import fixes, with_wrong_fixes
+from polyins.simulation.gnss import GnssReceiver, fixes, with_wrong_fixes
 from polyins.simulation.path import drive
 
 DRIVE = drive(200.0, static=20.0, seed=1)
 ANTENNA = np.array([-0.3, 0.2, -1.0])
+
+
+def received(path, seed, position_std, **others):
+    spread = {name: np.broadcast_to(std, 3) for name, std in others.items() if name.endswith("_std")}
+    receiver = GnssReceiver(ANTENNA, np.broadcast_to(position_std, 3), **(others | spread))
+    return fixes(path, receiver, np.random.default_rng(seed))
 
 
 def offsets(position, truth):
@@ -16,7 +22,7 @@ def offsets(position, truth):
 
 
 def test_perfect_fixes_are_the_antenna_s_true_states():
-    stream = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(0), position_std=0.0, velocity_std=0.0, phase=0.3)
+    stream = received(DRIVE, 0, 0.0, velocity_std=0.0, phase=0.3)
     truth = DRIVE.truth(stream.time, ANTENNA)
     np.testing.assert_array_equal(stream.position, truth.position)
     np.testing.assert_array_equal(stream.velocity, truth.velocity)
@@ -24,20 +30,19 @@ def test_perfect_fixes_are_the_antenna_s_true_states():
     np.testing.assert_allclose(np.linalg.norm(apart, axis=1), np.linalg.norm(ANTENNA), atol=1e-6)
 
 
-@pytest.mark.parametrize(("rate_hz", "phase", "count"), [(1.0, 0.3012, 200), (5.0, 0.0, 1001), (0.5, 1.5, 100)])
-def test_fixes_come_at_their_rate_and_phase(rate_hz, phase, count):
-    stream = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(0), position_std=1.0, rate_hz=rate_hz, phase=phase)
+@pytest.mark.parametrize(("rate", "phase", "count"), [(1.0, 0.3012, 200), (5.0, 0.0, 1001), (0.5, 1.5, 100)])
+def test_fixes_come_at_their_rate_and_phase(rate, phase, count):
+    stream = received(DRIVE, 0, 1.0, rate=rate, phase=phase)
     assert stream.time.size == count
     assert stream.time[0] == phase
     assert stream.time[-1] <= DRIVE.duration
-    np.testing.assert_allclose(np.diff(stream.time), 1.0 / rate_hz, atol=1e-12)
+    np.testing.assert_allclose(np.diff(stream.time), 1.0 / rate, atol=1e-12)
     assert stream.velocity is None
 
 
 def test_noise_is_what_the_stream_claims():
     std, velocity_std = np.array([0.5, 1.0, 2.0]), np.array([0.1, 0.2, 0.3])
-    rng = np.random.default_rng(2)
-    stream = fixes(DRIVE, ANTENNA, rng=rng, position_std=std, velocity_std=velocity_std, rate_hz=50.0)
+    stream = received(DRIVE, 2, std, velocity_std=velocity_std, rate=50.0)
     truth = DRIVE.truth(stream.time, ANTENNA)
     noise = offsets(stream.position, truth.position)
     np.testing.assert_allclose(noise.std(axis=0), std, rtol=0.04)
@@ -48,10 +53,7 @@ def test_noise_is_what_the_stream_claims():
 
 def test_slow_errors_wander_within_their_time_and_are_not_what_the_stream_claims():
     long, white, slow, stated = drive(2000.0, static=20.0, seed=1), 0.05, np.array([0.5, 1.0, 2.0]), [0.3, 0.2, 0.1]
-    rng = np.random.default_rng(5)
-    stream = fixes(
-        long, ANTENNA, rng=rng, position_std=white, slow_std=slow, slow_time=5.0, stated_std=stated, rate_hz=10.0
-    )
+    stream = received(long, 5, white, slow_std=slow, slow_time=5.0, stated_std=stated, rate=10.0)
     errors = offsets(stream.position, long.truth(stream.time, ANTENNA).position)
     np.testing.assert_allclose(errors.std(axis=0), np.hypot(white, slow), rtol=0.15)
     np.testing.assert_array_equal(stream.position_std, np.tile(stated, (stream.time.size, 1)))
@@ -65,7 +67,7 @@ def test_slow_errors_wander_within_their_time_and_are_not_what_the_stream_claims
 
 
 def test_lies_are_of_their_size_and_nowhere_else():
-    honest = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(3), position_std=0.01)
+    honest = received(DRIVE, 3, 0.01)
     among = np.arange(50, 150)
     lying, chosen = with_wrong_fixes(honest, among, 8, 30.0, np.random.default_rng(4))
     apart = offsets(lying.position, honest.position)
@@ -78,6 +80,6 @@ def test_lies_are_of_their_size_and_nowhere_else():
 
 
 def test_more_lies_than_fixes_are_refused():
-    honest = fixes(DRIVE, ANTENNA, rng=np.random.default_rng(3), position_std=0.01)
+    honest = received(DRIVE, 3, 0.01)
     with pytest.raises(InputError, match="4 lies among 3 fixes"):
         with_wrong_fixes(honest, np.arange(3), 4, 30.0, np.random.default_rng(4))

@@ -3,7 +3,7 @@ import pytest
 
 from polyins.errors import InputError
 from polyins.simulation.plane import Plane
-from polyins.simulation.track import track_path
+from polyins.simulation.track import LEVEL, Odometer, Survey, track_path
 
 ORIGIN = (0.0, 0.0, 0.0)
 ODOMETER = np.arange(0.0, 60.5, 0.5)
@@ -18,8 +18,9 @@ def loops(count=70, straight=10.0, radius=5.0):
     return np.minimum(way, straight) + radius * np.sin(angle), radius * (1.0 - np.cos(angle))
 
 
-def along(points, **options):
-    return track_path(*points, ODOMETER, SPEED, start=ORIGIN, world=Plane(), **options)
+def along(points, smoothing=0.7, slopes=LEVEL, **stands):
+    odometer = Odometer(ODOMETER, SPEED, **stands)
+    return track_path(Survey(*points, smoothing), odometer, slopes, start=ORIGIN, world=Plane())
 
 
 def test_a_path_through_the_points_of_a_curve_is_that_curve():
@@ -90,7 +91,7 @@ def test_noise_on_the_points_is_smoothed():
 )
 def test_what_is_no_track_is_refused(points, time, speed):
     with pytest.raises(InputError, match=r"track: .*; expected at least 6 points"):
-        track_path(*points, time, speed)
+        track_path(Survey(*points), Odometer(time, speed))
 
 
 def test_a_point_without_coordinates_is_refused():
@@ -102,14 +103,14 @@ def test_a_point_without_coordinates_is_refused():
 
 def test_an_odometer_that_never_moves_is_refused():
     with pytest.raises(InputError, match="track: the speeds are all zero; expected"):
-        track_path(*loops(), ODOMETER, np.zeros_like(SPEED))
+        track_path(Survey(*loops()), Odometer(ODOMETER, np.zeros_like(SPEED)))
 
 
 def test_an_odometer_s_noise_at_rest_is_rest():
     noisy = np.where(SPEED == 0.0, -0.02, SPEED)
     assert np.count_nonzero(noisy < 0.0) == 2
-    path = track_path(*loops(), ODOMETER, noisy, start=ORIGIN, world=Plane())
+    path = track_path(Survey(*loops()), Odometer(ODOMETER, noisy), start=ORIGIN, world=Plane())
     time = np.linspace(0.0, path.duration, 1000)
     np.testing.assert_array_equal(path.speed(time), along(loops()).speed(time))
     with pytest.raises(InputError, match="none of them backward"):
-        track_path(*loops(), ODOMETER, np.where(SPEED == 0.0, -0.2, SPEED), start=ORIGIN, world=Plane())
+        track_path(Survey(*loops()), Odometer(ODOMETER, np.where(SPEED == 0.0, -0.2, SPEED)))

@@ -7,7 +7,7 @@ from rolled import CENTRE, LEVER_ARM, RADIUS, WORLDS, drawn, in_body, wheel
 from scipy.spatial.transform import Rotation
 
 from polyins.simulation.ground import without_twist
-from polyins.simulation.path import Driving, drive, path
+from polyins.simulation.path import Driving, Profile, drive, path
 from polyins.simulation.plane import Plane
 from polyins.simulation.rolling import roll
 from polyins.simulation.wheels import wheel_increments
@@ -67,7 +67,7 @@ def test_a_standing_wheel_shows_earth_rate_and_gravity_whatever_its_angle():
 
 def test_a_wheel_at_constant_speed_shows_centripetal_force_and_turning_gravity():
     rate = 15.0
-    straight = path(Line(rate * 0.1), Line(), Line(), Line(0.7), duration=1.0, start=ORIGIN, world=Plane())
+    straight = path(Profile(Line(rate * 0.1), Line(), Line(), Line(0.7)), duration=1.0, start=ORIGIN, world=Plane())
     exact = wheel_increments(roll(straight, CENTRE, 0.1), 200.0)
     dtheta, dvel = exact.at(-np.array([0.0, 0.015, 0.0]))
     np.testing.assert_allclose(dtheta, np.tile([-rate / 200.0, 0.0, 0.0], (200, 1)), atol=1e-15)

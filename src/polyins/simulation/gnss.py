@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.model.recording import GnssStream
+from polyins.model.rig import Vector, zero_vector
 from polyins.simulation import earth
 from polyins.simulation.imu_errors import gauss_markov
 from polyins.simulation.path import Path, World
@@ -16,37 +17,42 @@ from polyins.simulation.path import Path, World
 Array = NDArray[np.float64]
 
 
-def fixes(
-    path: Path,
-    antenna: ArrayLike,
-    *,
-    rng: np.random.Generator,
-    position_std: ArrayLike,
-    slow_std: ArrayLike = 0.0,
-    slow_time: float = 60.0,
-    stated_std: ArrayLike | None = None,
-    velocity_std: ArrayLike | None = None,
-    rate_hz: float = 1.0,
-    phase: float = 0.0,
-) -> GnssStream:
-    """Return the fixes of an antenna at a place in the array frame, m, shape (3,).
+@dataclass(frozen=True)
+class GnssReceiver:
+    """A GNSS receiver: where its antenna is, when its fixes come and how good they are."""
 
-    Fixes come at phase + k / rate_hz, in s. `position_std`, m north, east, down, is the white noise, and what the
-    stream claims unless `stated_std` is given; `slow_std` is of an error besides that wanders within `slow_time`, s.
-    `velocity_std`, m/s, is both the noise and what the stream claims; None: no velocities.
-    """
-    time = phase + np.arange(int(np.floor((path.duration - phase) * rate_hz + 1e-9)) + 1) / rate_hz
-    truth = path.truth(time, antenna)
-    white, slow = np.asarray(position_std, dtype=float), np.asarray(slow_std, dtype=float)
-    errors = white * rng.standard_normal((time.size, 3))
-    if slow.any():
-        errors += slow * gauss_markov(time.size, 1.0 / (rate_hz * slow_time), rng)[:, :3]
+    antenna: Vector
+    """in the array frame, m"""
+    position_std: Vector
+    """of the white noise, m north, east, down"""
+    slow_std: Vector = field(default_factory=zero_vector)
+    """of an error besides that wanders, m north, east, down"""
+    slow_time: float = 60.0
+    """its correlation time, s"""
+    stated_std: Vector | None = None
+    """what the fixes claim, m; None: `position_std`"""
+    velocity_std: Vector | None = None
+    """of the velocity's noise, m/s, which is what the fixes claim; None: there are no velocities"""
+    rate: float = 1.0
+    """fixes per second"""
+    phase: float = 0.0
+    """time of the first fix, s"""
+
+
+def fixes(path: Path, receiver: GnssReceiver, rng: np.random.Generator) -> GnssStream:
+    """Return the fixes of a receiver on a path."""
+    rate, phase = receiver.rate, receiver.phase
+    time = phase + np.arange(int(np.floor((path.duration - phase) * rate + 1e-9)) + 1) / rate
+    truth = path.truth(time, receiver.antenna)
+    errors = receiver.position_std * rng.standard_normal((time.size, 3))
+    if receiver.slow_std.any():
+        errors += receiver.slow_std * gauss_markov(time.size, 1.0 / (rate * receiver.slow_time), rng)[:, :3]
     position = truth.position + path.world.displacement(truth.position, errors)
-    stated = white if stated_std is None else np.asarray(stated_std, dtype=float)
-    stream = GnssStream(time, position, np.broadcast_to(stated, position.shape).copy())
-    if velocity_std is None:
+    stated = receiver.position_std if receiver.stated_std is None else receiver.stated_std
+    stream = GnssStream(time, position, np.tile(stated, (time.size, 1)))
+    if receiver.velocity_std is None:
         return stream
-    velocity_std = np.broadcast_to(np.asarray(velocity_std, dtype=float), (time.size, 3)).copy()
+    velocity_std = np.tile(receiver.velocity_std, (time.size, 1))
     velocity = truth.velocity + velocity_std * rng.standard_normal(velocity_std.shape)
     return replace(stream, velocity=velocity, velocity_std=velocity_std)
 
@@ -63,7 +69,7 @@ def with_wrong_fixes(
 
     `among` are the indices to choose from, `size` the displacement in m; the claimed standard deviations stay.
 
-    Raises InputError if there are fewer fixes than lies.
+    Raises InputError if there are fewer fixes than that.
     """
     if count > among.size:
         raise InputError(f"gnss.lies: {count} lies among {among.size} fixes; expected no more lies than fixes")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.simulation.path import Path, path
+from polyins.simulation.path import Path, Profile, path
 
 Array = NDArray[np.float64]
 
@@ -42,10 +42,7 @@ def without_twist(twisting: Path, adapts: float = 20.0) -> Path:
     roll = CubicSpline(fine, twisting.heading(fine, 1) * np.sin(pitch(fine))).antiderivative()
     roll.c[-1] += tilt[1]
     return path(
-        twisting.speed,
-        roll,
-        pitch,
-        twisting.heading,
+        Profile(twisting.speed, roll, pitch, twisting.heading),
         duration=twisting.duration,
         static=twisting.static,
         start=twisting.position(begin)[0],

@@ -12,6 +12,7 @@ constant, drawn at turn-on, and a first-order Gauss-Markov drift; biases may wal
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,24 +195,33 @@ def gauss_markov(count: int, step: float, rng: np.random.Generator) -> Array:
     return np.asarray(lfilter([1.0], [1.0, -np.exp(-step)], white, axis=0))
 
 
+class TrueIncrements(NamedTuple):
+    """What an error-free IMU puts out along its own axes."""
+
+    time: Array
+    """s, of the ends of the intervals, evenly spaced, shape (T,)"""
+    dtheta: Array
+    """rad, shape (T, 3)"""
+    dvel: Array
+    """m/s, shape (T, 3)"""
+    vibration: Array | None = None
+    """its mean square along each axis, which the increments do not show, (m/s^2)^2, shape (T,); None: there is none"""
+
+
 def corrupt(
-    time: Array,
-    dtheta: Array,
-    dvel: Array,
+    true: TrueIncrements,
     errors: TrueErrors,
     white: NoiseGrade,
     rng: np.random.Generator,
     *,
     imperfections: Imperfections | None = None,
     shared: SharedNoise | None = None,
-    vibration: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return the increments, shape (T, 3) each, in sensor axes, with the errors and with white noise of a grade.
 
-    `time` is that of the ends of the intervals, s, shape (T,), evenly spaced. `imperfections` say how samples are
-    taken; `shared` is what the IMU has in common with its board; `vibration` is its mean square along each axis that
-    the increments do not show, (m/s^2)^2, shape (T,).
+    `imperfections` say how samples are taken; `shared` is what the IMU has in common with its board.
     """
+    time, dtheta, dvel, vibration = true
     interval = float(time[1] - time[0])
     imperfections = imperfections or Imperfections()
     gyro_bias, accel_bias, gyro_scale, accel_scale = np.split(errors.at(time - interval / 2.0), 4, axis=1)

@@ -8,7 +8,7 @@ integral of the yaw rate, position the integral of the velocity.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -188,24 +188,28 @@ class Driving:
     """rad per m/s^2 of lateral acceleration: the body leans out of the turn"""
 
 
-def path(
-    speed: Curve,
-    roll: Curve,
-    pitch: Curve,
-    heading: Curve,
-    *,
-    duration: float,
-    static: float = 0.0,
-    start: ArrayLike = START,
-    world: World = earth,
-    side_speed: Curve | None = None,
-) -> Path:
-    """Return the path that starts at a position, in the world's coordinates, and moves along its body's x axis.
+class Profile(NamedTuple):
+    """How the body moves and is turned over time."""
 
-    With a `side_speed`, m/s, it also moves along its y axis.
-    """
+    speed: Curve
+    """m/s along its x axis"""
+    roll: Curve
+    """rad"""
+    pitch: Curve
+    """rad, between -pi/2 and pi/2"""
+    heading: Curve
+    """rad, continuous"""
+    side_speed: Curve | None = None
+    """m/s along its y axis, where it slips sideways"""
+
+
+def path(
+    profile: Profile, *, duration: float, static: float = 0.0, start: ArrayLike = START, world: World = earth
+) -> Path:
+    """Return the path that starts at a position, in the world's coordinates, and moves as its profile says."""
     from scipy.interpolate import CubicSpline
 
+    speed, roll, pitch, heading, side_speed = profile
     time = np.linspace(0.0, duration, int(np.ceil(duration / POSITION_STEP)) + 1)
     p, y = pitch(time), heading(time)
     velocity = speed(time)[:, None] * np.stack([np.cos(p) * np.cos(y), np.cos(p) * np.sin(y), -np.sin(p)], axis=-1)
@@ -241,7 +245,7 @@ def drive(
     speed, yaw_rate, pitch, roll = (smooth_steps(knots[:, 0], column) for column in knots[:, 1:].T)
     heading = yaw_rate.antiderivative()
     heading.c[-1] += rng.uniform(-np.pi, np.pi)
-    return path(speed, roll, pitch, heading, duration=duration, static=static, start=start, world=world)
+    return path(Profile(speed, roll, pitch, heading), duration=duration, static=static, start=start, world=world)
 
 
 def smooth_steps(time: Array, value: Array) -> PPoly:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.errors import InputError
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.rig import DEG
-from polyins.simulation.path import Path, path
+from polyins.simulation.path import Path, Profile, path
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -83,16 +83,14 @@ def replay(time: ArrayLike, position: ArrayLike, std: ArrayLike, *, ride: Ride =
     along = speed / np.cos(pitch)
     # a body that leans slips downwards too: its nose takes that back, for the height is the road's
     pitch = pitch - np.tan(inwards) * np.sin(roll)
-    return path(
+    profile = Profile(
         _curve(grid, along * np.cos(inwards)),
         _curve(grid, roll),
         _curve(grid, pitch),
         _curve(grid, heading + inwards),
-        duration=float(times[-1] - times[0]),
-        static=standing_start(grid, speed),
-        start=points[0],
-        side_speed=_curve(grid, -along * np.sin(inwards)) if ride.side_slip else None,
+        _curve(grid, -along * np.sin(inwards)) if ride.side_slip else None,
     )
+    return path(profile, duration=float(times[-1] - times[0]), static=standing_start(grid, speed), start=points[0])
 
 
 def standing_start(grid: Array, speed: Array) -> float:

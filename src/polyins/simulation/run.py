@@ -24,12 +24,12 @@ from polyins.model.recording import (
     RollingOptions,
     StartOptions,
 )
-from polyins.model.rig import DEG, Imu, NoiseGrade
+from polyins.model.rig import Imu, NoiseGrade
 from polyins.simulation import gnss
 from polyins.simulation.flexible import flex
 from polyins.simulation.flexible_scenario import Road
 from polyins.simulation.ground import without_twist
-from polyins.simulation.imu_errors import TrueErrors, corrupt, draw_errors
+from polyins.simulation.imu_errors import TrueErrors, TrueIncrements, corrupt, draw_errors
 from polyins.simulation.increments import Increments, increments, stamps
 from polyins.simulation.moving_imu import FINE_STEPS, moving_increments, smooth_rates
 from polyins.simulation.path import Path
@@ -225,19 +225,10 @@ def _sense(
     """Return an IMU as it is configured, what it puts out, turned into array axes as a reader does, and its errors."""
     scenario, time = run.scenario, run.time
     imperfections, grade = scenario.errors.imperfections(), read(scenario.noise, NoiseGrade)
-    dtheta, dvel = run.sensed(imu)
     errors = draw_errors(time[-1], grade, imperfections, rng, shared=shared, number=number)
-    dtheta, dvel = corrupt(
-        time,
-        dtheta,
-        dvel,
-        errors,
-        imperfections.limit(grade),
-        rng,
-        imperfections=imperfections,
-        shared=shared,
-        vibration=scenario.errors.vibration(run.path.speed(time)),
-    )
+    true = TrueIncrements(time, *run.sensed(imu), scenario.errors.vibration(run.path.speed(time)))
+    white = imperfections.limit(grade)
+    dtheta, dvel = corrupt(true, errors, white, rng, imperfections=imperfections, shared=shared)
     # row by row, as recordings are read
     dtheta, dvel = (np.ascontiguousarray(product(imu.rotation, vectors)) for vectors in (dtheta, dvel))
     stream = ImuStream(imu.name, time, dtheta, dvel)
@@ -266,15 +257,13 @@ def _start(scenario: Scenario, run: TrueRun) -> StartOptions:
         return StartOptions(static_interval=interval, heading=float(truth.attitude[0, 2]), heading_from="value")
     if not scenario.wheels or scenario.gnss:
         return StartOptions(static_interval=interval)
-    std = scenario.start_std
-    return StartOptions(
+    return read(
+        scenario.start_std,
+        StartOptions,
         static_interval=interval,
         position=truth.position[0],
         heading=float(truth.attitude[0, 2]),
         heading_from="value",
-        position_std=np.array(std.position_m),
-        velocity_std=np.array(std.velocity_m_s),
-        attitude_std=np.array(std.attitude_deg) * DEG,
     )
 
 
@@ -283,18 +272,7 @@ def _receive(scenario: Scenario, path: Path, rng: np.random.Generator) -> tuple[
     if scenario.gnss is None:
         return None, np.zeros(0, dtype=np.intp)
     receiver = scenario.gnss
-    stream = gnss.fixes(
-        path,
-        receiver.antenna_position_m,
-        rng=rng,
-        position_std=receiver.position_std_m,
-        slow_std=receiver.slow_std_m,
-        slow_time=receiver.slow_time_s,
-        stated_std=receiver.stated_std_m,
-        velocity_std=receiver.velocity_std_m_s,
-        rate_hz=receiver.rate_hz,
-        phase=receiver.phase_s,
-    )
+    stream = gnss.fixes(path, read(receiver, gnss.GnssReceiver), rng)
     shown = stream.time > scenario.static_s
     for begin, end in scenario.outage_intervals():
         shown &= (stream.time < begin) | (stream.time > end)

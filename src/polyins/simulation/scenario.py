@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +88,7 @@ class WrongFixes(Section):
 class Fixes(Section):
     """The GNSS receiver."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {"antenna_position": "antenna"}
     rate_hz: Positive = 1.0
     """fixes per second"""
     phase_s: NotNegative = 0.3012
@@ -110,6 +112,7 @@ class Fixes(Section):
 class StartStd(Section):
     """How sure a start that the truth gives claims to be, 1 sigma; paper B's lab starts like that."""
 
+    FIELDS: ClassVar[Mapping[str, str]] = {name: f"{name}_std" for name in ("position", "velocity", "attitude")}
     position_m: Spread = (0.05, 0.05, 0.05)
     """north, east, down, m"""
     velocity_m_s: Spread = (0.05, 0.05, 0.05)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polyins.simulation import earth
-from polyins.simulation.path import START, Path, World, path, smooth_steps
+from polyins.simulation.path import START, Path, Profile, World, path, smooth_steps
 from polyins.simulation.track import Level
 
 Array = NDArray[np.float64]
@@ -60,4 +60,4 @@ def shuttle_path(
     ahead.c[-1] += heading
     times = np.cumsum([0.0, static, there.speed_up, duration + 1.0])
     pace = smooth_steps(times, np.array([0.0, 0.0, speed, speed]))
-    return path(pace, Level(), Level(), ahead, duration=duration, static=static, start=start, world=world)
+    return path(Profile(pace, Level(), Level(), ahead), duration=duration, static=static, start=start, world=world)

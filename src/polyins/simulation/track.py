@@ -7,14 +7,14 @@ so it is the course at departure as long as the vehicle stands.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polyins.errors import InputError
 from polyins.simulation import earth
-from polyins.simulation.path import START, Path, World, path
+from polyins.simulation.path import START, Path, Profile, World, path
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -72,31 +72,59 @@ class Waves:
         return self.steepest * (np.sin(way) if nu == 0 else np.cos(way) * number * self.distance(time, 1))
 
 
+class Survey(NamedTuple):
+    """The points of a track, in their order."""
+
+    north: ArrayLike
+    """m, shape (P,)"""
+    east: ArrayLike
+    """m, shape (P,)"""
+    smoothing: float = 0.7
+    """m: bends much shorter than this are smoothed away"""
+
+
+class Odometer(NamedTuple):
+    """The speeds at which a track is travelled, between two stands."""
+
+    time: ArrayLike
+    """s, shape (S,)"""
+    speed: ArrayLike
+    """m/s, shape (S,)"""
+    static: float = 30.0
+    """s of standing before"""
+    rest: float = 5.0
+    """s of standing after"""
+
+
+class Slopes(NamedTuple):
+    """Ground that goes up and down along the way."""
+
+    steepest: float = 0.0
+    """rad; 0: it is level"""
+    wave: float = 60.0
+    """length of a wave, m"""
+
+
+LEVEL = Slopes()
+
+
 def track_path(
-    north: ArrayLike,
-    east: ArrayLike,
-    time: ArrayLike,
-    speed: ArrayLike,
+    survey: Survey,
+    odometer: Odometer,
+    slopes: Slopes = LEVEL,
     *,
-    static: float = 30.0,
-    rest: float = 5.0,
-    smoothing: float = 0.7,
-    steepest: float = 0.0,
-    wave: float = 60.0,
     start: ArrayLike = START,
     world: World = earth,
 ) -> Path:
-    """Return the path through points, north and east in m, shape (P,), at speeds, m/s, shape (S,), at times in s.
+    """Return the path from `start`, in the world's coordinates, along the points at the speeds; the roll is zero.
 
-    The curve is smoothed over `smoothing`, m. The path starts at `start`, in the world's coordinates, stands for
-    `static` and at the end for `rest`, s; the speeds are smoothed over 0.7 of their interval (1 sigma) and scaled so
-    that they last to the end of the curve. Backward speeds within an odometer's noise at rest, 0.05 m/s, are taken as
-    rest. The ground goes up and down with slopes of at most `steepest`, rad, in waves of a length `wave`, m; the roll
-    is zero.
+    The speeds are smoothed over 0.7 of their interval (1 sigma) and scaled so that they last to the end of the curve.
+    Backward speeds within an odometer's noise at rest, 0.05 m/s, are taken as rest.
 
     Raises InputError for points or speeds that make no path.
     """
-    points, times, speeds = _distinct(north, east), np.asarray(time, dtype=float), np.asarray(speed, dtype=float)
+    points, static = _distinct(survey.north, survey.east), odometer.static
+    times, speeds = np.asarray(odometer.time, dtype=float), np.asarray(odometer.speed, dtype=float)
     if (
         points.shape[1] <= DEGREE
         or len(times) < 2
@@ -110,15 +138,15 @@ def track_path(
     speeds = np.maximum(speeds, 0.0)
     if not np.any(speeds > 0.0):
         raise InputError("track: the speeds are all zero; expected some above zero")
-    length, heading = _course(points, smoothing)
+    length, heading = _course(points, survey.smoothing)
     step = float(np.median(np.diff(times)))
     reach = (DEGREE + 1) / 2.0 * step
-    duration = float(np.ceil(static + times[-1] - times[0] + 2.0 * reach + rest))
+    duration = float(np.ceil(static + times[-1] - times[0] + 2.0 * reach + odometer.rest))
     pace = _smooth_speed(times - times[0] + static + reach, speeds, step, duration)
     pace.c = pace.c * (length / float(pace.integrate(0.0, duration)))
     course = TrackHeading(heading, pace.antiderivative())
-    slope = Waves(course.distance, steepest, wave) if steepest else Level()
-    return path(pace, Level(), slope, course, duration=duration, static=static, start=start, world=world)
+    slope = Waves(course.distance, slopes.steepest, slopes.wave) if slopes.steepest else Level()
+    return path(Profile(pace, Level(), slope, course), duration=duration, static=static, start=start, world=world)
 
 
 def _distinct(north: ArrayLike, east: ArrayLike) -> Array:

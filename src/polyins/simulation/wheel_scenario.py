@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from polyins.config import NotNegative, Number, Positive, Section, Triple
 from polyins.config.fields import blame
+from polyins.config.units import read
 from polyins.formats.columns import column_names, read_columns
 from polyins.model.rig import DEG, Imu, NoiseGrade, Wheel
 from polyins.simulation import earth
@@ -18,7 +19,7 @@ from polyins.simulation.laps import lap_length, lap_points, lap_speeds
 from polyins.simulation.path import Path, World
 from polyins.simulation.rolling import RollingWheel, roll
 from polyins.simulation.slip import slip_periods
-from polyins.simulation.track import track_path
+from polyins.simulation.track import Odometer, Slopes, Survey, track_path
 
 Array = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ class WheelModule(Section):
 
     def imus(self, grade: NoiseGrade) -> list[Imu]:
         """Return the module's IMUs."""
-        wheel = Wheel(self.radius_m, np.array(self.lever_arm_m))
+        wheel = read(self, Wheel)
         return [
             Imu(f"{self.name}{number}", grade, position=np.array(self.position_m), wheel=wheel, module=self.name)
             for number in range(1, self.chips + 1)
@@ -91,26 +92,10 @@ class Terrain(Section):
     slope_adapts_m: Annotated[Number, Field(ge=1.0)] = 20.0
     """the way over which the ground, bent until it does not twist, comes back to these waves, m"""
 
-    def over(
-        self,
-        points: tuple[Array, Array],
-        speeds: tuple[Array, Array],
-        static: float,
-        start: ArrayLike,
-        world: World,
-        **shape: float,
-    ) -> Path:
-        """Return the path over this ground, see `track_path`, which `shape` is for: points, m; times, s, and m/s."""
-        return track_path(
-            *points,
-            *speeds,
-            static=static,
-            steepest=self.slope_deg * DEG,
-            wave=self.slope_length_m,
-            start=start,
-            world=world,
-            **shape,
-        )
+    def over(self, survey: Survey, odometer: Odometer, start: ArrayLike, world: World) -> Path:
+        """Return the path along points over this ground, see `track_path`."""
+        slopes = Slopes(self.slope_deg * DEG, self.slope_length_m)
+        return track_path(survey, odometer, slopes, start=start, world=world)
 
 
 class SurveyedTrack(Terrain):
@@ -128,8 +113,8 @@ class SurveyedTrack(Terrain):
     def path(self, static: float, start: ArrayLike, world: World) -> Path:
         """Return the path along the track; raises InputError for files that give none."""
         _, (time, speed) = read_columns(self.odometer, ("time_s", "speed_m_s"))
-        shape = {"rest": self.rest_s, "smoothing": self.smoothing_m}
-        return self.over(self._points(), (time, speed), static, start, world, **shape)
+        survey = Survey(*self._points(), self.smoothing_m)
+        return self.over(survey, Odometer(time, speed, static, self.rest_s), start, world)
 
     def _points(self) -> tuple[Array, Array]:
         """Return the points north and east of the first one, m."""
@@ -178,7 +163,7 @@ class Laps(Terrain):
         speeds = lap_speeds(
             self._length, self.speed_m_s, change=self.change_m_s, every=self.change_every_s, starting=self.starting_s
         )
-        return self.over(points, speeds, static, start, world)
+        return self.over(Survey(*points), Odometer(*speeds, static), start, world)
 
     @property
     def _length(self) -> float:

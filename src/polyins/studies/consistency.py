@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.config.units import in_si
 from polyins.evaluation.consistency import nees, nees_bounds, share_inside
 from polyins.kernels import covariance
 from polyins.model.attitude import rotation_matrices
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import StartOptions
-from polyins.model.rig import DEG
 from polyins.navigate import batch
 from polyins.navigate.state import LOG_EVERY, STRIDE
 from polyins.prepare.alignment import rotation_matrix
@@ -75,10 +75,10 @@ def errors_of(scenario: Scenario, seed: int) -> tuple[Array, Array]:
 
 
 def _start(path: Path, claimed: StartStd, rng: np.random.Generator) -> StartOptions:
-    """Return the true state with errors drawn from the standard deviations that the filter is told."""
+    """Return the true state with errors drawn from the standard deviations that the filter has."""
     truth = path.truth(np.array([STARTS_AT]))
-    position_std, velocity_std = np.array(claimed.position_m), np.array(claimed.velocity_m_s)
-    attitude_std = np.array(claimed.attitude_deg) * DEG
+    keys = ("position_m", "velocity_m_s", "attitude_deg")
+    position_std, velocity_std, attitude_std = (in_si(claimed, key) for key in keys)
     metres = metres_per_unit(truth.position[0], True)
     # the error of attitude is phi: C_hat = (I - phi x) C
     phi = rng.normal(0.0, attitude_std)
