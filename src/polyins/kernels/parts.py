@@ -149,7 +149,7 @@ class _ScalarPartCompiler(_Compiler):
     library = _ScalarPartLibrary
 
 
-class _ScalarPartType(numba.types.Dispatcher):
+class _PartType(numba.types.Dispatcher):
     """Numbers that are known beforehand, such as offsets, do not make a variant each."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
@@ -157,7 +157,7 @@ class _ScalarPartType(numba.types.Dispatcher):
         return super().get_call_type(context, unknown, kws)
 
 
-numba.extending.register_model(_ScalarPartType)(numba.core.datamodel.models.OpaqueModel)
+numba.extending.register_model(_PartType)(numba.core.datamodel.models.OpaqueModel)
 
 
 class Part:
@@ -167,10 +167,10 @@ class Part:
         """`compile_`: `numba.njit` with the options of all kernels; `scalar`: it has no loops that vectorize."""
         self.py_func = function
         self._compile = compile_
-        compiler, kind = (_ScalarPartCompiler, _ScalarPartType) if scalar else (_PartCompiler, numba.types.Dispatcher)
+        compiler = _ScalarPartCompiler if scalar else _PartCompiler
         # its type knows it by a weak reference only
         self._dispatcher = compile_(function, pipeline_class=compiler, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-        self._numba_type_ = kind(self._dispatcher)
+        self._numba_type_ = _PartType(self._dispatcher)
 
     @cached_property
     def _alone(self) -> Callable[..., Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
 from polyins.navigate.events import Events
 from polyins.navigate.layout import Bank
-from polyins.navigate.state import Inputs, Navigators, Outputs, Plan, State
+from polyins.navigate.state import Further, Inputs, Navigators, Outputs, Plan, State, further_work
 from polyins.prepare import alignment, rigid, timesync, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.timesync import Aligned
@@ -68,9 +69,15 @@ class Prepared:
         """What it is told."""
         return self.navigators.plan
 
+    @cached_property
+    def further(self) -> Further | None:
+        """What some runs need besides."""
+        return further_work(self.state, self.plan)
+
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
-        self.loop(self.navigators, self.inputs, self.outputs, self.full_matrices, first, last)
+        further, epochs = self.further, slice(first, last)
+        self.loop(self.navigators, self.inputs, self.outputs, further, self.full_matrices, epochs)
 
 
 def run(

@@ -119,7 +119,7 @@ def lay_out(
     _fill_scalars(state.scalars, recording, start, interval)
     state.silent[:] = -1.0
     plan = _plan(row, choice, seats, recording, rows, stride)
-    return memory, Navigators(state, plan, empty_work(count, stride, joined))
+    return memory, Navigators(state, plan, empty_work(count, joined))
 
 
 def states_of(rig: Rig) -> int:
