@@ -166,8 +166,8 @@ def lay_out(
     start = alignment.levelled(start, recording.rig, aligned.increments[0], interval)
     seats = layout.seat(row, choice, recording.rig, start)
     order = list(choice.blocks[0]) if row.bank == "mean" else seats.order
-    first = aligned.increments[0][:, seats.order]
-    memory, navigators = layout.lay_out(row, choice, seats, recording, start, first, interval)
+    rates = aligned.increments[0][:, seats.order] / interval
+    memory, navigators = layout.lay_out(row, choice, seats, recording, start, rates)
     navigators.plan.settings[places.LOG_EVERY] = max(1, round(aligned.rate_hz))
     inputs = inputs_of(choice, order, recording, aligned, start, end)
     navigators.plan.settings[places.MAY_BE_SILENT] = len(inputs.present) > 0

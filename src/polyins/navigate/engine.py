@@ -151,7 +151,7 @@ def propagate(
             dense.predict(block, model, dt, full_matrices[0], full_matrices[1])
     if full_matrices is None:
         if further is not None:
-            _predict_joint(state, work, dt, int(plan.settings[STRIDE]))
+            joint.predict(blocks, work.covariance, dt, state.joint, int(plan.settings[STRIDE]))
     elif joined:
         dense.predict_joined(blocks, work.covariance, dt, state.joint, full_matrices[0], full_matrices[1])
     scalars[TIME] += dt
@@ -197,16 +197,6 @@ def _predict_either(block: Array, model: Array, dt: float, stride: int) -> None:
         covariance.predict(block, model, dt)
     else:
         covariance.predict_any(block, model, dt, stride)
-
-
-@scalar_kernel
-def _predict_joint(state: State, work: Work, dt: float, stride: int) -> None:
-    count = state.joint.shape[0] // stride
-    for s in range(count):
-        covariance.scale_terms(state.blocks[s], work.covariance[s])
-    for s in range(count):
-        for other in range(s + 1, count):
-            joint.predict(state.blocks, s, other, dt, state.joint, work.covariance, stride)
 
 
 @scalar_kernel
@@ -282,6 +272,7 @@ def begin(navigators: Navigators, raw: Array, interval: float) -> None:
     The increments that end at the start, (6, N), are the previous ones of the first epoch.
     """
     state, plan, work = navigators.state, navigators.plan, navigators.work
+    state.scalars[INTERVAL] = interval
     reference = state.scalars[EARTH : EARTH + 5]
     if plan.settings[VIRTUAL] != 0.0:
         fuse.average_increments(raw, interval, plan.origin, state.scalars[PREVIOUS : PREVIOUS + 4], state.rows)
