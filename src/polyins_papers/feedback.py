@@ -42,7 +42,7 @@ def run_with_feedback(navigators: Navigators, inputs: Inputs, outputs: Outputs, 
     """Take all epochs of an array, and feed the fused velocity, attitude or both back after each."""
     state = navigators.state
     for k in range(1, len(inputs.time)):
-        engine.run(navigators, inputs, outputs, None, k, k + 1)
+        engine.run(navigators, inputs, outputs, None, None, slice(k, k + 1))
         for b in range(state.rows.shape[0]):
             if velocity:
                 fuse.take_fused_velocity(state.rows[b], state.blocks[0])

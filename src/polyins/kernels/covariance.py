@@ -395,30 +395,32 @@ def _felt_by_rows(work: Array) -> None:
 Nine = tuple[Three, Three, Three]
 
 
-@kernel
+@scalar_kernel
 def _navigation_factors(work: Array, i: int) -> Nine:
     t = T + i * STRIDE
     return column(work, t, 1), column(work, t + _V, 1), column(work, t + _P, 1)
 
 
-@kernel
-def _put_s(work: Array, i: int, j: int, t: Nine, r: Three, v: Three, p: Three) -> None:
-    work[S + i * SENSORS + j] = work[T + i * STRIDE + 1 + j] + dot(t[0], r) + dot(t[1], v) + dot(t[2], p)
+@scalar_kernel
+def _back(own: float, t: Nine, a: Nine) -> float:
+    """Element of (A N) A', of which A' is the identity and what F dt adds."""
+    return own + dot(t[0], a[0]) + dot(t[1], a[1]) + dot(t[2], a[2])
 
 
 @formula
 def _navigation_rows(work: Array, i: int) -> None:
     """Write three rows of S = (A N) A' from the i-th on, all columns but the first."""
     t0, t1, t2 = _navigation_factors(work, i), _navigation_factors(work, i + 1), _navigation_factors(work, i + 2)
+    s, t = S + i * SENSORS, T + i * STRIDE + 1
     for j in range(SENSORS):
-        r, v, p = (
+        a = (
             column(work, F + 1 + j, HALF),
             column(work, F + _V * HALF + 1 + j, HALF),
             column(work, F + _P * HALF + 1 + j, HALF),
         )
-        _put_s(work, i, j, t0, r, v, p)
-        _put_s(work, i + 1, j, t1, r, v, p)
-        _put_s(work, i + 2, j, t2, r, v, p)
+        work[s + j] = _back(work[t + j], t0, a)
+        work[s + SENSORS + j] = _back(work[t + STRIDE + j], t1, a)
+        work[s + 2 * SENSORS + j] = _back(work[t + 2 * STRIDE + j], t2, a)
 
 
 @kernel
@@ -429,9 +431,8 @@ def _back_to_navigation(work: Array) -> None:
     _navigation_rows(work, 6)
 
 
-@kernel
-def _put_z(work: Array, i: int, j: int, b: Three, a: Three, rate: Three, force: Three) -> None:
-    z = dot(b, rate) + dot(a, force)
+@scalar_kernel
+def _put_z(work: Array, i: int, j: int, z: float) -> None:
     work[Z + i * SENSORS + j] = z
     work[S + i * SENSORS + j] += z
 
@@ -451,9 +452,9 @@ def _sensor_rows(work: Array, i: int) -> None:
     )
     for j in range(SENSORS):
         rate, force = column(work, F + _G * HALF + 1 + j, HALF), column(work, F + _A * HALF + 1 + j, HALF)
-        _put_z(work, i, j, b0, a0, rate, force)
-        _put_z(work, i + 1, j, b1, a1, rate, force)
-        _put_z(work, i + 2, j, b2, a2, rate, force)
+        _put_z(work, i, j, dot(b0, rate) + dot(a0, force))
+        _put_z(work, i + 1, j, dot(b1, rate) + dot(a1, force))
+        _put_z(work, i + 2, j, dot(b2, rate) + dot(a2, force))
 
 
 @kernel
@@ -511,7 +512,7 @@ def predict(block: Array, work: Array, dt: float) -> None:
 
 
 @kernel
-def _through_errors(block: Array, work: Array, dt: float, stride: int, row_: int, bias: int, scale: int) -> None:
+def _through_errors(work: Array, stride: int, row_: int, bias: int, scale: int) -> None:
     """Three rows of navigation states take what biases and scales do to them."""
     b0, b1, b2 = (
         factors(work, F + bias * HALF + row_),
@@ -551,8 +552,8 @@ def through(block: Array, work: Array, dt: float, stride: int) -> None:
         work[TO + 6 * stride + j] = p[0] + times(f6, r, v, p[1], p[2])
         work[TO + 7 * stride + j] = p[1] + times(f7, r, v, p[2], p[0])
         work[TO + 8 * stride + j] = p[2] + times(f8, r, v, p[0], p[1])
-    _through_errors(block, work, dt, stride, 3, _A, _AS)
-    _through_errors(block, work, dt, stride, 6, _G, _GS)
+    _through_errors(work, stride, 3, _A, _AS)
+    _through_errors(work, stride, 6, _G, _GS)
     for i in range(NAV, stride):
         keep = 1.0 - dt * block[DECAY + i - NAV]
         for j in range(stride):

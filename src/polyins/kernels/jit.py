@@ -80,7 +80,7 @@ def entry(function: F) -> F:
     """
     if PARTS is None:
         return _compiled(function, cache=True)
-    return _compiled(function, cache=True, no_cfunc_wrapper=True, _nrt=False)
+    return _compiled(function, cache=True, no_cfunc_wrapper=True, _nrt=False, pipeline_class=PARTS.EntryCompiler)
 
 
 def compiled_for(function: F, *arguments: Any) -> F:

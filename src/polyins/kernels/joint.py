@@ -8,29 +8,34 @@ advances them.
 from __future__ import annotations
 
 from polyins.kernels import covariance, kalman
-from polyins.kernels.covariance import FROM, P
+from polyins.kernels.covariance import FROM, TO, P
 from polyins.kernels.jit import Array, kernel
 
 ROWS = kalman.ROWS
 
 
 @kernel
-def predict(blocks: Array, a: int, b: int, dt: float, joint: Array, work: Array, stride: int) -> None:
+def predict(blocks: Array, work: Array, dt: float, joint: Array, stride: int) -> None:
     """P_ab <- Phi_a P_ab Phi_b' in the square matrix; the noises of two IMUs have nothing in common.
 
-    `work` (blocks, .): the rows of both blocks hold their complete F.
+    `work` (blocks, .) holds F dt of each block, but for the terms of scales.
     """
-    for i in range(stride):
-        for j in range(stride):
-            work[a, FROM + i * stride + j] = joint[a * stride + i, b * stride + j]
-    covariance.through(blocks[a], work[a], dt, stride)
-    for i in range(stride):
-        for j in range(stride):
-            work[b, FROM + j * stride + i] = work[a, covariance.TO + i * stride + j]
-    covariance.through(blocks[b], work[b], dt, stride)
-    for i in range(stride):
-        for j in range(stride):
-            joint[a * stride + j, b * stride + i] = work[b, covariance.TO + i * stride + j]
+    count = joint.shape[0] // stride
+    for s in range(count):
+        covariance.scale_terms(blocks[s], work[s])
+    for a in range(count):
+        for b in range(a + 1, count):
+            for i in range(stride):
+                for j in range(stride):
+                    work[a, FROM + i * stride + j] = joint[a * stride + i, b * stride + j]
+            covariance.through(blocks[a], work[a], dt, stride)
+            for i in range(stride):
+                for j in range(stride):
+                    work[b, FROM + j * stride + i] = work[a, TO + i * stride + j]
+            covariance.through(blocks[b], work[b], dt, stride)
+            for i in range(stride):
+                for j in range(stride):
+                    joint[a * stride + j, b * stride + i] = work[b, TO + i * stride + j]
 
 
 @kernel

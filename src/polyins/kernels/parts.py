@@ -7,14 +7,17 @@ Nothing else depends on what is here: where Numba has changed, `jit` compiles by
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from typing import Any
 
 import numba
+from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_machinery import PassManager
+from numba.core.types import Function
 
 
 def start_without_scipy() -> None:
@@ -33,7 +36,60 @@ def start_without_scipy() -> None:
             linalg.ensure_blas = ask
 
 
-class _PartLibrary(JITCodeLibrary):
+@contextmanager
+def _looked_up_once() -> Iterator[None]:
+    """Look up once which of the many templates of an operator takes operands of given types, not wherever it stands."""
+    operators: Any = Function
+    look_up = operators.get_call_type
+
+    def recalled(operator: Any, context: Any, args: Any, kws: Any) -> Any:
+        if kws or (operator, context, args) not in _FOUND:
+            signature = look_up(operator, context, args, kws)
+            # what is compiled for a call depends on more than its types
+            if kws or operator.get_impl_key(signature) is not operator.typing_key:
+                return signature
+            _FOUND[operator, context, args] = signature
+        return _FOUND[operator, context, args]
+
+    operators.get_call_type = recalled
+    try:
+        yield
+    finally:
+        operators.get_call_type = look_up
+
+
+_FOUND: dict[Any, Any] = {}
+
+PASSES = (
+    untyped_passes.TranslateByteCode,
+    untyped_passes.FixupArgs,
+    untyped_passes.IRProcessing,
+    untyped_passes.RewriteSemanticConstants,
+    untyped_passes.DeadBranchPrune,
+    untyped_passes.GenericRewrites,
+    untyped_passes.InlineInlinables,
+    untyped_passes.DeadBranchPrune,
+    untyped_passes.ReconstructSSA,
+    untyped_passes.DeadBranchPrune,
+    typed_passes.NopythonTypeInference,
+    typed_passes.PreLowerStripPhis,
+    typed_passes.IRLegalization,
+    typed_passes.AnnotateTypes,
+    typed_passes.NativeLowering,
+    typed_passes.NoPythonBackend,
+)
+"""those of Numba's that kernels need: they have no closures, no exceptions and no expressions of arrays"""
+
+
+class _Library(JITCodeLibrary):
+    """Code that counts no references, of which Numba would optimise all twice."""
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = self._codegen._module_pass_manager()  # type: ignore[no-untyped-call]
+        passes.run(self._final_module, builder)
+
+
+class _PartLibrary(_Library):
     """Code that waits to be linked into that of an entry; there is no machine code of it."""
 
     def _finalize_final_module(self) -> None:
@@ -55,19 +111,45 @@ class _ScalarPartLibrary(_PartLibrary):
         pass
 
 
-class _PartCompiler(Compiler):
-    library = _PartLibrary
+class _Compiler(CompilerBase):
+    library: Any
 
-    def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
-        own = self.library(target_context.codegen(), "part")  # type: ignore[no-untyped-call]
+    def __init__(self, typing_context: Any, target_context: Any, _: Any, *rest: Any) -> None:
+        own = self.library(target_context.codegen(), "kernel")
         super().__init__(typing_context, target_context, own, *rest)  # type: ignore[no-untyped-call]
 
+    def define_pipelines(self) -> list[PassManager]:
+        manager: Any = PassManager("kernel")  # type: ignore[no-untyped-call]
+        for one in PASSES:
+            manager.add_pass(one, one.__name__)
+        manager.finalize()
+        return [manager]
 
-class _ScalarPartCompiler(_PartCompiler):
+
+class EntryCompiler(_Compiler):
+    """Compiles an entry and with it all of its parts."""
+
+    library = _Library
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.library.enable_object_caching()
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile a function."""
+        with _looked_up_once():
+            return super().compile_extra(func)  # type: ignore[no-untyped-call]
+
+
+class _PartCompiler(_Compiler):
+    library = _PartLibrary
+
+
+class _ScalarPartCompiler(_Compiler):
     library = _ScalarPartLibrary
 
 
-class _ScalarPartType(numba.types.Dispatcher):
+class _PartType(numba.types.Dispatcher):
     """Numbers that are known beforehand, such as offsets, do not make a variant each."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
@@ -75,7 +157,7 @@ class _ScalarPartType(numba.types.Dispatcher):
         return super().get_call_type(context, unknown, kws)
 
 
-numba.extending.register_model(_ScalarPartType)(numba.core.datamodel.models.OpaqueModel)
+numba.extending.register_model(_PartType)(numba.core.datamodel.models.OpaqueModel)
 
 
 class Part:
@@ -85,14 +167,16 @@ class Part:
         """`compile_`: `numba.njit` with the options of all kernels; `scalar`: it has no loops that vectorize."""
         self.py_func = function
         self._compile = compile_
-        compiler, kind = (_ScalarPartCompiler, _ScalarPartType) if scalar else (_PartCompiler, numba.types.Dispatcher)
+        compiler = _ScalarPartCompiler if scalar else _PartCompiler
         # its type knows it by a weak reference only
         self._dispatcher = compile_(function, pipeline_class=compiler, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-        self._numba_type_ = kind(self._dispatcher)
+        self._numba_type_ = _PartType(self._dispatcher)
 
     @cached_property
     def _alone(self) -> Callable[..., Any]:
-        alone: Callable[..., Any] = self._compile(self.py_func, cache=True, no_cfunc_wrapper=True)
+        alone: Callable[..., Any] = self._compile(
+            self.py_func, cache=True, no_cfunc_wrapper=True, pipeline_class=EntryCompiler
+        )
         return alone
 
     def __call__(self, *arguments: Any) -> Any:

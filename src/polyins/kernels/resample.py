@@ -5,6 +5,8 @@ A sample is taken as constant within its own interval, which is the same as inte
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from polyins.kernels.jit import Array, entry, kernel
 
 TOGETHER = 8
@@ -13,18 +15,41 @@ BLOCK = 256
 """epochs of one axis at once: what they write stays in the cache until the other axes have had their turn"""
 
 
-@kernel
-def resample_interval(
-    stamps: Array, values: Array, first: int, last: int, before: float, begin: float, end: float, out: Array
-) -> None:
-    """Write into `out` (6,) what samples `first` ... `last` - 1 measured between `begin` and `end`.
+class Samples(NamedTuple):
+    """Samples of one IMU."""
 
-    `stamps` (S,) ends each sample's interval, `values` is (S, 6); `before` is where the interval of `first` begins.
-    """
+    stamps: Array
+    """s (S,), each ends the interval of a sample"""
+    values: Array
+    """(S, 6)"""
+    first: int
+    last: int
+    """behind the last that counts"""
+    before: float
+    """s, where the interval of the first begins"""
+
+
+class Waiting(NamedTuple):
+    """Samples of N IMUs that wait."""
+
+    stamps: Array
+    """s (N, S)"""
+    values: Array
+    """(N, S, 6)"""
+    first: Array
+    last: Array
+    before: Array
+    """(N,), see `Samples`"""
+
+
+@kernel
+def resample_interval(samples: Samples, begin: float, end: float, out: Array) -> None:
+    """Write into `out` (6,) what samples measured between `begin` and `end`."""
+    stamps, values = samples.stamps, samples.values
     for a in range(6):
         out[a] = 0.0
-    left = before
-    for j in range(first, last):
+    left = samples.before
+    for j in range(samples.first, samples.last):
         right = stamps[j]
         if left >= end:
             break
@@ -51,31 +76,22 @@ def resample(stamps: Array, values: Array, before: float, time: Array, begin: fl
         last = first
         while last < len(stamps) and stamps[last] < time[k]:
             last += 1
-        resample_interval(stamps, values, first, min(last + 1, len(stamps)), before, begin, time[k], out[k])
+        samples = Samples(stamps, values, first, min(last + 1, len(stamps)), before)
+        resample_interval(samples, begin, time[k], out[k])
         begin = time[k]
 
 
 @entry
-def assemble(
-    stamps: Array,
-    values: Array,
-    first: Array,
-    last: Array,
-    before: Array,
-    longest: Array,
-    begin: float,
-    end: float,
-    increments: Array,
-    missing: Array,
-) -> None:
-    """Take from the waiting samples of N IMUs what they measured between `begin` and `end`, and let those go that end.
+def assemble(waiting: Waiting, longest: Array, begin: float, end: float, increments: Array, missing: Array) -> None:
+    """Take from waiting samples what they measured between `begin` and `end`, and let those go that end.
 
-    `stamps` (N, B) and `values` (N, B, 6) hold the samples `first` (N,) ... `last` - 1; `before` (N,) is where each
-    first one begins. Writes `increments` (N, 6), and `missing` (N,) where an interval longer than `longest` (N,) or the
-    end of the samples reaches into this one.
+    Writes `increments` (N, 6), and `missing` (N,) where an interval longer than `longest` (N,) or the end of the
+    samples reaches into this one.
     """
+    stamps, first, last, before = waiting.stamps, waiting.first, waiting.last, waiting.before
     for i in range(stamps.shape[0]):
-        resample_interval(stamps[i], values[i], first[i], last[i], before[i], begin, end, increments[i])
+        samples = Samples(stamps[i], waiting.values[i], first[i], last[i], before[i])
+        resample_interval(samples, begin, end, increments[i])
         missing[i] = False
         left = before[i]
         for j in range(first[i], last[i]):
@@ -116,12 +132,5 @@ def interleave(streams: tuple[Array, ...], first: int, row: int, out: Array) -> 
                     to[0], to[1], to[2], to[3] = a[k, j], b[k, j], c[k, j], d[k, j]
                     to[4], to[5], to[6], to[7] = e[k, j], f[k, j], g[k, j], h[k, j]
                 else:
-                    _some(a[k, j], b[k, j], c[k, j], d[k, j], e[k, j], f[k, j], g[k, j], to)
-
-
-@kernel
-def _some(a: float, b: float, c: float, d: float, e: float, f: float, g: float, to: Array) -> None:
-    """Write the first of at most seven numbers."""
-    for i, value in enumerate((a, b, c, d, e, f, g)):
-        if i < len(to):
-            to[i] = value
+                    for i in range(count):
+                        to[i] = streams[i][k, j]

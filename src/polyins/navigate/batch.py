@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
 from polyins.navigate.events import Events
 from polyins.navigate.layout import Bank
-from polyins.navigate.state import Inputs, Navigators, Outputs, Plan, State
+from polyins.navigate.state import Further, Inputs, Navigators, Outputs, Plan, State, further_work
 from polyins.prepare import alignment, rigid, timesync, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.timesync import Aligned
@@ -79,9 +80,15 @@ class Prepared:
         """What it is told."""
         return self.navigators.plan
 
+    @cached_property
+    def further(self) -> Further | None:
+        """What some runs need besides."""
+        return further_work(self.state, self.plan)
+
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
-        self.loop(self.navigators, self.inputs, self.outputs, self.full_matrices, first, last)
+        further, epochs = self.further, slice(first, last)
+        self.loop(self.navigators, self.inputs, self.outputs, further, self.full_matrices, epochs)
 
     def at(self, stretch: Aligned) -> Prepared:
         """Return the run at further epochs, of which the first is the last that it has taken."""
@@ -178,8 +185,8 @@ def lay_out(
     interval = float(aligned.time[1] - aligned.time[0])
     start = alignment.levelled(start, recording.rig, aligned.increments[0], interval)
     seats = layout.seat(row, choice, recording.rig, start)
-    first = aligned.increments[0][:, seats.order]
-    memory, navigators = layout.lay_out(row, choice, seats, recording, start, first, interval)
+    rates = aligned.increments[0][:, seats.order] / interval
+    memory, navigators = layout.lay_out(row, choice, seats, recording, start, rates)
     settings = navigators.plan.settings
     settings[places.LOG_EVERY] = log_every(aligned)
     settings[places.MAY_BE_SILENT] = _may_be_silent(recording, aligned.missing) if gaps is None else gaps

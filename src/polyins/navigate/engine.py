@@ -36,6 +36,7 @@ from polyins.navigate.state import (
     WINDOW_FILLED,
     WINDOW_LATERAL,
     WINDOW_TRAVEL,
+    Further,
     Inputs,
     Navigators,
     Outputs,
@@ -52,12 +53,19 @@ Dense = tuple[Array, Array] | None
 
 
 @entry
-def run(navigators: Navigators, inputs: Inputs, outputs: Outputs, full_matrices: Dense, first: int, last: int) -> None:
-    """Take epochs first ... last - 1; the first of a recording is 1, since epoch 0 is the start."""
+def run(
+    navigators: Navigators,
+    inputs: Inputs,
+    outputs: Outputs,
+    further: Further | None,
+    full_matrices: Dense,
+    epochs: slice,
+) -> None:
+    """Take those epochs; the first of a recording is 1, since epoch 0 is the start."""
     state, plan, work = navigators.state, navigators.plan, navigators.work
     snap, log_every = plan.settings[SNAP], int(plan.settings[LOG_EVERY])
     due = _next_event(state, inputs)
-    for k in range(first, last):
+    for k in range(epochs.start, epochs.stop):
         now, end = inputs.time[k - 1], inputs.time[k]
         load(state, plan, inputs, k)  # increments; who is there
         arrived = False
@@ -67,16 +75,16 @@ def run(navigators: Navigators, inputs: Inputs, outputs: Outputs, full_matrices:
                 until = end if arrived else due
                 if arrived or until > now + snap:
                     fraction = (until - now) / (end - inputs.time[k - 1])
-                    propagate(state, plan, work, full_matrices, fraction, until - now)  # A (1), (3), (5);  B (2)
+                    propagate(navigators, further, full_matrices, fraction, until - now)  # A (1), (3), (5);  B (2)
                     if state.scalars[WINDOW_FILLED] >= 0.0:
                         window.fill(state, plan, inputs, k, fraction, until - now)  # B (3)-(4)
                     now = until
                 if arrived and inputs.present.shape[0] > 0:
                     silence.move_silent(state, plan, work, inputs, k)
             if due <= end + snap:
-                aid(state, plan, work, inputs, outputs)  # A (6)-(11);  B (5)-(14)
+                aid(navigators, further, inputs, outputs)  # A (6)-(11);  B (5)-(14)
                 due = _next_event(state, inputs)
-        write(state, plan, outputs, k)
+        write(state, plan, outputs, further, k)
         if (k - 1) % log_every == 0:
             _log(state, plan, outputs, end)
             gather_idle_lanes(state, plan)
@@ -116,14 +124,17 @@ def _put_increments(rows: Array, raw: Array) -> None:
 
 
 @formula
-def propagate(state: State, plan: Plan, work: Work, full_matrices: Dense, fraction: float, dt: float) -> None:
+def propagate(
+    navigators: Navigators, further: Further | None, full_matrices: Dense, fraction: float, dt: float
+) -> None:
     """Advance every IMU, every covariance block and the merged state by dt, a fraction of the measured interval."""
+    state, plan, work = navigators.state, navigators.plan, navigators.work
     rows, blocks, spans, scalars = state.rows, state.blocks, plan.spans, state.scalars
     reference = scalars[EARTH : EARTH + 5]
     if reference[0] != 0.0 and abs(blocks[-1, covariance.POSITION] - reference[1]) > FARTHEST_REFERENCE:
         earth.move_reference(reference, blocks[-1, covariance.POSITION])
     _mechanize(state, plan, work, fraction, dt)  # A (1); B (2)
-    stride, joined = int(plan.settings[STRIDE]), state.joint.shape[0] > 0
+    joined = state.joint.shape[0] > 0
     for s in range(spans.shape[0]):
         block, model = blocks[s], work.covariance[s if joined else 0]
         if spans[s, 1] - spans[s, 0] > 1:
@@ -132,17 +143,17 @@ def propagate(state: State, plan: Plan, work: Work, full_matrices: Dense, fracti
             fuse.take_measurement(rows, spans[s, 0], block, dt)
         covariance.error_model(block, model, dt, reference)  # A (3)
         if full_matrices is None:
-            if stride == covariance.STRIDE:
+            if further is None:
                 covariance.predict(block, model, dt)  # A (5)
             else:
-                covariance.predict_any(block, model, dt, stride)
+                _predict_either(block, model, dt, int(plan.settings[STRIDE]))
         elif not joined:
             dense.predict(block, model, dt, full_matrices[0], full_matrices[1])
-    if joined:
-        if full_matrices is None:
-            _predict_joint(state, work, dt, stride)
-        else:
-            dense.predict_joined(blocks, work.covariance, dt, state.joint, full_matrices[0], full_matrices[1])
+    if full_matrices is None:
+        if further is not None:
+            joint.predict(blocks, work.covariance, dt, state.joint, int(plan.settings[STRIDE]))
+    elif joined:
+        dense.predict_joined(blocks, work.covariance, dt, state.joint, full_matrices[0], full_matrices[1])
     scalars[TIME] += dt
     scalars[INTERVAL] = dt
     for s in range(spans.shape[0]):
@@ -181,18 +192,17 @@ def _mechanize(state: State, plan: Plan, work: Work, fraction: float, dt: float)
 
 
 @scalar_kernel
-def _predict_joint(state: State, work: Work, dt: float, stride: int) -> None:
-    count = state.joint.shape[0] // stride
-    for s in range(count):
-        covariance.scale_terms(state.blocks[s], work.covariance[s])
-    for s in range(count):
-        for other in range(s + 1, count):
-            joint.predict(state.blocks, s, other, dt, state.joint, work.covariance, stride)
+def _predict_either(block: Array, model: Array, dt: float, stride: int) -> None:
+    if stride == covariance.STRIDE:
+        covariance.predict(block, model, dt)
+    else:
+        covariance.predict_any(block, model, dt, stride)
 
 
 @scalar_kernel
-def aid(state: State, plan: Plan, work: Work, inputs: Inputs, outputs: Outputs) -> None:
+def aid(navigators: Navigators, further: Further | None, inputs: Inputs, outputs: Outputs) -> None:
     """Apply the next event to the state as it is."""
+    state, plan, work = navigators.state, navigators.plan, navigators.work
     j = int(state.scalars[NEXT_EVENT])
     state.scalars[NEXT_EVENT] += 1.0
     kind, measurement = inputs.event_kind[j], work.measurement
@@ -206,7 +216,7 @@ def aid(state: State, plan: Plan, work: Work, inputs: Inputs, outputs: Outputs) 
     if kind == kinds.WINDOW:
         window.open_at(state, plan, state.scalars[TIME], measurement[VALUE])
     elif _complete(state, plan, measurement, kind):
-        status = update.apply(state, plan, work, outputs.innovations[j])
+        status = update.apply(state, plan, work, further, outputs.innovations[j])
     if kind == kinds.GNSS_POSITION:
         state.scalars[REJECTED_AT] = inputs.event_time[j] if status == update.REJECTED else -math.inf
     outputs.event_status[j] = status
@@ -262,6 +272,7 @@ def begin(navigators: Navigators, raw: Array, interval: float) -> None:
     The increments that end at the start, (6, N), are the previous ones of the first epoch.
     """
     state, plan, work = navigators.state, navigators.plan, navigators.work
+    state.scalars[INTERVAL] = interval
     reference = state.scalars[EARTH : EARTH + 5]
     if plan.settings[VIRTUAL] != 0.0:
         fuse.average_increments(raw, interval, plan.origin, state.scalars[PREVIOUS : PREVIOUS + 4], state.rows)
@@ -289,7 +300,7 @@ def begin(navigators: Navigators, raw: Array, interval: float) -> None:
 
 
 @formula
-def write(state: State, plan: Plan, outputs: Outputs, k: int) -> None:
+def write(state: State, plan: Plan, outputs: Outputs, further: Further | None, k: int) -> None:
     """Write row k: the merged state and its variances.
 
     Of several blocks that are apart the variance is their mean; joined, it is that of the mean of their errors.
@@ -300,18 +311,20 @@ def write(state: State, plan: Plan, outputs: Outputs, k: int) -> None:
     variance = outputs.variances[k]
     for i in range(12):
         variance[i] = 0.0
-    for s in range(count):
-        block = state.blocks[s]
-        if state.joint.shape[0] == 0:
-            _add_variances(block, covariance.P, stride, 1.0 / count, variance)
-        else:
-            _add_variances(block, covariance.P, stride, 1.0 / count**2, variance)
-            for t in range(s + 1, count):
+    if further is None:
+        for s in range(count):
+            _add_variances(state.blocks[s], stride, 1.0 / count, variance)
+    else:
+        joined = state.joint.shape[0] > 0
+        for s in range(count):
+            _add_variances(state.blocks[s], stride, 1.0 / count**2 if joined else 1.0 / count, variance)
+            for t in range(s + 1, count if joined else 0):
                 _add_joint_variances(state.joint, s * stride, t * stride, 2.0 / count**2, variance)
 
 
 @scalar_kernel
-def _add_variances(block: Array, p: int, stride: int, weight: float, variance: Array) -> None:
+def _add_variances(block: Array, stride: int, weight: float, variance: Array) -> None:
+    p = covariance.P
     for i in range(6):
         variance[i] += weight * block[p + i * (stride + 1)]
     n = 6

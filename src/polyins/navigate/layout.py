@@ -99,11 +99,11 @@ def _virtual(choice: Choice, rig: Rig, start: Start) -> Member:
 
 
 def lay_out(
-    row: Method, choice: Choice, seats: Bank, recording: Recording, start: Start, first: Array, interval: float
+    row: Method, choice: Choice, seats: Bank, recording: Recording, start: Start, rates: Array
 ) -> tuple[Array, Navigators]:
     """Return the array of all that a run remembers, and the navigators at their start, whose parts lie in it.
 
-    `first`: the increments that end at the start, (6, lanes), over `interval` s.
+    `rates`: rates and forces at the start as the IMUs show them, (6, lanes).
     """
     count, rig = len(seats.spans), recording.rig
     joined = row.joined and count > 1
@@ -111,15 +111,15 @@ def lay_out(
     stride = stride_for(states_of(recording.rig))
     rows = -(-len(seats.members) // LANES)
     memory, state = empty_state(rows, count, merged, stride, joined)
-    _fill_lanes(state.rows, seats, recording, start, first / interval)
+    _fill_lanes(state.rows, seats, recording, start, rates)
     for s, (begin, end) in enumerate(seats.spans):
         _fill_block(state.blocks[s], seats.members[begin:end], recording, choice, start)
     if joined and row.bank == "all":
         _share_start(state, count, stride)
-    _fill_scalars(state.scalars, recording, start, interval)
+    _fill_scalars(state.scalars, recording, start)
     state.silent[:] = -1.0
     plan = _plan(row, choice, seats, recording, rows, stride)
-    return memory, Navigators(state, plan, empty_work(count, stride, joined))
+    return memory, Navigators(state, plan, empty_work(count, joined))
 
 
 def states_of(rig: Rig) -> int:
@@ -213,9 +213,9 @@ def _share_start(state: State, count: int, stride: int) -> None:
                 state.joint[s * stride + i, t * stride + i] = variance
 
 
-def _fill_scalars(scalars: Array, recording: Recording, start: Start, interval: float) -> None:
+def _fill_scalars(scalars: Array, recording: Recording, start: Start) -> None:
     latitude = start.position[0]
-    scalars[places.TIME], scalars[places.INTERVAL] = start.time, interval
+    scalars[places.TIME] = start.time
     scalars[places.REJECTED_AT] = -np.inf
     scalars[places.WINDOW_FILLED] = -1.0
     scalars[places.EARTH : places.EARTH + 5] = (

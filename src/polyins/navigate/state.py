@@ -139,12 +139,21 @@ class Work(NamedTuple):
     """(blocks, kalman.SIZE)"""
     measurement: Array
     """(measurement.SIZE,)"""
+    residuals: Array
+    """(blocks, 8) of one event's measurements: residual, its variances; the block whose members differ from it, or -1;
+    which of `updates` is its own"""
+
+
+class Further(NamedTuple):
+    """What a run needs besides whose blocks are joined or that has more states than most.
+
+    Most have None instead: what is only for others is then left out of what is compiled.
+    """
+
     vectors: Array
     """(3, 3, size of the joint covariance): H P, the transposed gain, A H'"""
     designs: Array
     """(blocks, 3, size of the joint covariance): of one event's measurements"""
-    residuals: Array
-    """(blocks, 9): residual of each of them, its variances; the block whose members differ from it, or -1"""
     correction: Array
     """(size of the joint covariance,): sum of the corrections of one event so far"""
 
@@ -181,16 +190,20 @@ def empty_state(rows: int, blocks: int, merged: bool, stride: int, joined: bool)
     return memory, State(*parts)
 
 
-def empty_work(blocks: int, stride: int, joined: bool) -> Work:
+def empty_work(blocks: int, joined: bool) -> Work:
     """Return the work arrays of a run."""
-    joint = blocks * stride if joined else 0
     return Work(
         covariance=layout.zeros(blocks if joined else 1, covariance.WORK),
         sums=layout.zeros(blocks, fuse.SUMS),
         updates=layout.zeros(blocks, kalman.SIZE),
         measurement=layout.zeros(measurement.SIZE),
-        vectors=np.zeros((3, 3, joint)),
-        designs=np.zeros((blocks, 3, joint)),
-        residuals=np.zeros((blocks, 9)),
-        correction=np.zeros(joint),
+        residuals=np.zeros((blocks, 8)),
     )
+
+
+def further_work(state: State, plan: Plan) -> Further | None:
+    """Return what a run needs besides."""
+    size, count = len(state.joint), len(plan.spans)
+    if size == 0 and plan.settings[STRIDE] == covariance.STRIDE:
+        return None
+    return Further(np.zeros((3, 3, size)), np.zeros((count, 3, size)), np.zeros(size))

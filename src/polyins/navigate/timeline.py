@@ -47,12 +47,9 @@ class Timeline:
             size *= 2
         self._allocate(size, size)
         # the window's arrays come and go, their types do not
-        self.run = replace(
-            self.run,
-            loop=compiled_for(
-                self.run.loop, self.run.navigators, self.inputs, self.outputs, self.run.full_matrices, 1, 1
-            ),
-        )
+        others = (self.run.further, self.run.full_matrices, slice(1, 1))
+        loop = compiled_for(self.run.loop, self.run.navigators, self.inputs, self.outputs, *others)
+        self.run = replace(self.run, loop=loop)
         self.inputs.time[0] = inputs.time[0]
         self.inputs.increments[0] = inputs.increments[0]
         self._note(0)

@@ -21,6 +21,7 @@ from polyins.navigate.state import (
     REOPEN_AFTER,
     STRIDE,
     TIME,
+    Further,
     Plan,
     State,
     Work,
@@ -37,27 +38,51 @@ MOST_GROWTH = 100.0
 """of the covariance when the gate reopens: standard deviations tenfold"""
 
 HP, K, AH = range(3)
-"""places in `Work.vectors`"""
-Z, R, OWNER = 0, 3, 6
+"""places in `Further.vectors`"""
+Z, R, OWNER, UPDATE = 0, 3, 6, 7
 """places in a row of `Work.residuals`"""
+NIS = 6
+"""place in a row of `Outputs.innovations`"""
 
 
 @scalar_kernel
-def apply(state: State, plan: Plan, work: Work, innovation: Array) -> int:
+def apply(state: State, plan: Plan, work: Work, further: Further | None, innovation: Array) -> int:
     """Measure with all blocks, write the innovation, and correct them unless the gate rejects it; return its status."""
     if state.blocks.shape[0] == plan.spans.shape[0]:
         vehicle.update_attitudes(state.rows, state.blocks, plan.spans, plan.lenders)
-    joined = state.joint.shape[0] > 0
-    rows = _measure_joint(state, plan, work) if joined else _measure_each(state, plan, work)
+    if further is None:
+        return _apply_apart(state, plan, work, innovation)
+    if state.joint.shape[0] == 0:
+        return _apply_apart(state, plan, work, innovation)
+    return _apply_joined(state, plan, work, further, innovation)
+
+
+@scalar_kernel
+def _apply_apart(state: State, plan: Plan, work: Work, innovation: Array) -> int:
+    rows = _measure_each(state, plan, work)
     if rows == 0:
         return UNUSED
-    nis = _record(work, innovation, rows)
-    status = _decide(state, plan, work, rows, nis)
+    _record(work, innovation, rows)
+    status = _decide(state, plan, work, rows, innovation[NIS])
+    if status == REOPENED:
+        _reopen_each(state, plan, work, rows, innovation[NIS])
     if status != REJECTED:
-        if joined:
-            _correct_joint(state, plan, work, rows)
-        else:
-            _correct_each(state, plan, work)
+        _correct_each(state, plan, work)
+        window.begin_anew(state, plan, state.scalars[TIME])
+    return status
+
+
+@scalar_kernel
+def _apply_joined(state: State, plan: Plan, work: Work, further: Further, innovation: Array) -> int:
+    rows = _measure_joint(state, plan, work, further)
+    if rows == 0:
+        return UNUSED
+    _record(work, innovation, rows)
+    status = _decide(state, plan, work, rows, innovation[NIS])
+    if status == REOPENED:
+        _reopen_joint(state, plan, work, further, innovation[NIS])
+    if status != REJECTED:
+        _correct_joint(state, plan, work, further, rows)
         window.begin_anew(state, plan, state.scalars[TIME])
     return status
 
@@ -111,12 +136,11 @@ def _measure_each(state: State, plan: Plan, work: Work) -> int:
     """Measure with every block that is not silent; return how many those are."""
     rows = 0
     for s in range(plan.spans.shape[0]):
-        work.residuals[s, OWNER] = -1.0
         if state.silent[0, s] < 0.0:
             update = work.updates[s]
             measure_block(state, plan, work.measurement, s, update)
             kalman.gain(state.blocks[s], update, int(plan.settings[STRIDE]))
-            work.residuals[rows, OWNER] = s
+            work.residuals[rows, OWNER] = work.residuals[rows, UPDATE] = s
             rows += 1
     return rows
 
@@ -132,22 +156,22 @@ def _measures(state: State, plan: Plan, s: int) -> bool:
 
 
 @scalar_kernel
-def _add_rows(state: State, plan: Plan, s: int, sign: float, update: Array, design: Array) -> None:
-    """Add the design matrix of a block, and of the one that lends to it, to that of all states."""
+def _add_design(state: State, plan: Plan, s: int, factor: float, update: Array, design: Array) -> None:
+    """Add the design matrix of a block, and of the one that lends to it, times a factor to that of all states."""
     stride = int(plan.settings[STRIDE])
     for a in range(kalman.ROWS):
         for k in range(stride):
-            design[a, s * stride + k] += sign * update[kalman.H + a * LARGEST + k]
+            design[a, s * stride + k] += factor * update[kalman.H + a * LARGEST + k]
     lender = plan.lenders[s]
     if lender >= 0:
         vehicle_attitude.write_lent(state.blocks, s, lender, update)
         for a in range(kalman.ROWS):
             for k in range(stride):
-                design[a, lender * stride + k] += sign * update[kalman.LENT + a * LARGEST + k]
+                design[a, lender * stride + k] += factor * update[kalman.LENT + a * LARGEST + k]
 
 
 @scalar_kernel
-def _measure_joint(state: State, plan: Plan, work: Work) -> int:
+def _measure_joint(state: State, plan: Plan, work: Work, further: Further) -> int:
     """Write design matrices in all states, residuals and variances of what is measured; return how many.
 
     That is the mean of what all blocks predict where the noise of a measurement is one, what each predicts where it has
@@ -161,51 +185,54 @@ def _measure_joint(state: State, plan: Plan, work: Work) -> int:
     for s in range(plan.spans.shape[0]):
         if not _measures(state, plan, s):
             continue
-        update = work.updates[s]
-        measure_block(state, plan, work.measurement, s, update)
+        measure_block(state, plan, work.measurement, s, work.updates[s])
         if how == kinds.MEAN:
             if before < 0:
-                _begin_row(work, 0, -1, update)
-            _add_measured(state, plan, work, s, 0, 1.0 / count)
+                _begin_row(work, further, 0, -1, s)
+            _add_residual(work, 0, s, 1.0 / count)
+            _add_design(state, plan, s, 1.0 / count, work.updates[s], further.designs[0])
             rows = 1
         elif how == kinds.EACH:
-            _begin_row(work, rows, s, update)
-            _add_measured(state, plan, work, s, rows, 1.0)
+            _begin_row(work, further, rows, s, s)
+            _add_residual(work, rows, s, 1.0)
+            _add_design(state, plan, s, 1.0, work.updates[s], further.designs[rows])
             rows += 1
         else:
             if before >= 0:
-                _begin_row(work, rows, -1, update)
-                _add_measured(state, plan, work, s, rows, 1.0)
-                _add_measured(state, plan, work, before, rows, -1.0)
+                _begin_row(work, further, rows, -1, s)
+                for one, sign in ((s, 1.0), (before, -1.0)):
+                    _add_residual(work, rows, one, sign)
+                    _add_design(state, plan, one, sign, work.updates[one], further.designs[rows])
                 rows += 1
         before = s
     for row in range(rows):
-        _gain_of_row(state, work, row)
+        _gain_of_row(state, work, further, row)
     return rows
 
 
 @scalar_kernel
-def _begin_row(work: Work, row: int, owner: int, update: Array) -> None:
-    work.designs[row, :, :] = 0.0
-    work.residuals[row, OWNER] = owner
+def _begin_row(work: Work, further: Further, row: int, owner: int, s: int) -> None:
+    """Begin a measurement with the variances that block s has for it."""
     for a in range(kalman.ROWS):
+        for j in range(further.designs.shape[2]):
+            further.designs[row, a, j] = 0.0
         work.residuals[row, Z + a] = 0.0
-        work.residuals[row, R + a] = update[kalman.R + a]
+        work.residuals[row, R + a] = work.updates[s, kalman.R + a]
+    work.residuals[row, OWNER], work.residuals[row, UPDATE] = owner, row
 
 
 @scalar_kernel
-def _add_measured(state: State, plan: Plan, work: Work, s: int, row: int, factor: float) -> None:
-    _add_rows(state, plan, s, factor, work.updates[s], work.designs[row])
+def _add_residual(work: Work, row: int, s: int, factor: float) -> None:
     for a in range(kalman.ROWS):
         work.residuals[row, Z + a] += factor * work.updates[s, kalman.RESIDUAL + a]
 
 
 @scalar_kernel
-def _gain_of_row(state: State, work: Work, row: int) -> None:
+def _gain_of_row(state: State, work: Work, further: Further, row: int) -> None:
     """Write the gain of one measurement, and its residual and S into the work array of that number."""
-    vectors, update = work.vectors, work.updates[row]
+    vectors, update = further.vectors, work.updates[row]
     variances = work.residuals[row, R : R + 3]
-    joint.gain(work.designs[row], variances, state.joint, vectors[HP], vectors[K], update)
+    joint.gain(further.designs[row], variances, state.joint, vectors[HP], vectors[K], update)
     for a in range(kalman.ROWS):
         update[kalman.RESIDUAL + a] = work.residuals[row, Z + a]
 
@@ -214,24 +241,15 @@ def _gain_of_row(state: State, work: Work, row: int) -> None:
 
 
 @scalar_kernel
-def _number(work: Work, row: int, joined: bool) -> int:
-    """Return which work array holds a measurement: apart, that of its block; joined, that of its number."""
-    return row if joined else int(work.residuals[row, OWNER])
-
-
-@scalar_kernel
-def _record(work: Work, innovation: Array, rows: int) -> float:
-    """Write the mean residual and its variance over what was measured, and the mean NIS, which is returned."""
-    joined = work.correction.shape[0] > 0
+def _record(work: Work, innovation: Array, rows: int) -> None:
+    """Write the mean residual and its variance over what was measured, and the mean NIS."""
     innovation[:] = 0.0
     for row in range(rows):
-        update = work.updates[_number(work, row, joined)]
+        update = work.updates[int(work.residuals[row, UPDATE])]
         for a in range(kalman.ROWS):
             innovation[a] += update[kalman.RESIDUAL + a] / rows
             innovation[3 + a] += update[kalman.S + 4 * a] / rows
-        innovation[6] += kalman.normalized_innovation_squared(update) / rows
-    nis: float = innovation[6]
-    return nis
+        innovation[NIS] += kalman.normalized_innovation_squared(update) / rows
 
 
 @scalar_kernel
@@ -246,43 +264,29 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, nis: float) -> int:
     if not kinds.REOPENS[kind] or state.scalars[rejections] <= plan.settings[REOPEN_AFTER]:
         return REJECTED
     state.scalars[rejections] = 0.0
-    _reopen(state, plan, work, rows, nis)
     return REOPENED
 
 
 @scalar_kernel
 def _passes_gate(plan: Plan, work: Work, rows: int, nis: float) -> bool:
-    limit, joined = plan.settings[GATE_LIMIT], work.correction.shape[0] > 0
+    limit = plan.settings[GATE_LIMIT]
     if nis <= limit:
         return True
     cautious = 0.0
     for row in range(rows):
-        cautious += kalman.cautious_innovation_squared(work.updates[_number(work, row, joined)], CAUTION)
+        cautious += kalman.cautious_innovation_squared(work.updates[int(work.residuals[row, UPDATE])], CAUTION)
     passes: bool = cautious <= limit * rows
     return passes
 
 
 @scalar_kernel
-def _reopen(state: State, plan: Plan, work: Work, rows: int, nis: float) -> None:
-    """Let the covariance grow until the measurement, of a position, is believable.
+def _reopen_each(state: State, plan: Plan, work: Work, rows: int, nis: float) -> None:
+    """Let the covariances grow until the measurement, of a position, is believable.
 
     The filter is surer of itself than it should be, in velocity and attitude as much as in position, so P is scaled
-    as a whole; what is left of a jump that no error of this size explains goes to the position alone, of all blocks.
+    as a whole; what is left of a jump that no error of this size explains goes to the position alone.
     """
     growth, stride = min(nis / 3.0, MOST_GROWTH), int(plan.settings[STRIDE])
-    if state.joint.shape[0] > 0:
-        size = state.joint.shape[0]
-        for i in range(size):
-            for j in range(size):
-                state.joint[i, j] *= growth
-        _gain_of_row(state, work, 0)
-        if kalman.normalized_innovation_squared(work.updates[0]) > plan.settings[GATE_LIMIT]:
-            for a in range(kalman.ROWS):
-                for i in range(a, size, stride):
-                    for j in range(a, size, stride):
-                        state.joint[i, j] += work.residuals[0, Z + a] ** 2
-            _gain_of_row(state, work, 0)
-        return
     for row in range(rows):
         s = int(work.residuals[row, OWNER])
         block, update = state.blocks[s], work.updates[s]
@@ -292,6 +296,22 @@ def _reopen(state: State, plan: Plan, work: Work, rows: int, nis: float) -> None
             for a in range(kalman.ROWS):
                 block[P + a * (stride + 1)] += update[kalman.RESIDUAL + a] ** 2
             kalman.gain(block, update, stride)
+
+
+@scalar_kernel
+def _reopen_joint(state: State, plan: Plan, work: Work, further: Further, nis: float) -> None:
+    """Let the covariance of all blocks grow as `_reopen_each` does that of one; a jump goes to all their positions."""
+    growth, stride, size = min(nis / 3.0, MOST_GROWTH), int(plan.settings[STRIDE]), state.joint.shape[0]
+    for i in range(size):
+        for j in range(size):
+            state.joint[i, j] *= growth
+    _gain_of_row(state, work, further, 0)
+    if kalman.normalized_innovation_squared(work.updates[0]) > plan.settings[GATE_LIMIT]:
+        for a in range(kalman.ROWS):
+            for i in range(a, size, stride):
+                for j in range(a, size, stride):
+                    state.joint[i, j] += work.residuals[0, Z + a] ** 2
+        _gain_of_row(state, work, further, 0)
 
 
 # --- what it corrects -------------------------------------------------------------------------------------------------
@@ -322,28 +342,28 @@ def member_correction(lanes: Array, lane: int, update: Array, stride: int) -> No
 
 
 @scalar_kernel
-def _correct_joint(state: State, plan: Plan, work: Work, rows: int) -> None:
+def _correct_joint(state: State, plan: Plan, work: Work, further: Further, rows: int) -> None:
     """Apply the measurements of one event, all made at the same states, one after the other.
 
     Each residual is less what the corrections before it explain.
     """
-    stride, vectors = int(plan.settings[STRIDE]), work.vectors
+    stride, vectors = int(plan.settings[STRIDE]), further.vectors
     size = state.joint.shape[0]
-    work.correction[:] = 0.0
+    further.correction[:] = 0.0
     for b in range(state.rows.shape[0]):
         state.rows[b, bank.CORRECTION : bank.CORRECTION + bank.STATES * LANES] = 0.0
     for row in range(rows):
         for a in range(kalman.ROWS):
             for j in range(size):
-                work.residuals[row, Z + a] -= work.designs[row, a, j] * work.correction[j]
-        _gain_of_row(state, work, row)
+                work.residuals[row, Z + a] -= further.designs[row, a, j] * further.correction[j]
+        _gain_of_row(state, work, further, row)
         for s in range(plan.spans.shape[0]):
             if state.silent[0, s] >= 0.0:
                 vectors[K, :, s * stride : (s + 1) * stride] = 0.0
         variances = work.residuals[row, R : R + 3]
-        design = work.designs[row]
+        design = further.designs[row]
         joint.update_covariance(design, variances, state.joint, vectors[HP], vectors[K], vectors[AH])
-        _add_corrections(state, plan, work, row)
+        _add_corrections(state, plan, further, work.residuals[row])
     joint.scatter(state.blocks, plan.spans.shape[0], state.joint, stride)
     for s in range(plan.spans.shape[0]):
         if state.silent[0, s] < 0.0:
@@ -352,16 +372,16 @@ def _correct_joint(state: State, plan: Plan, work: Work, rows: int) -> None:
 
 
 @scalar_kernel
-def _add_corrections(state: State, plan: Plan, work: Work, row: int) -> None:
+def _add_corrections(state: State, plan: Plan, further: Further, residual: Array) -> None:
     """Add K z to the corrections of all members; those of the block that measured differ from its mean by their own."""
-    k, z, stride = work.vectors[K], work.residuals[row, Z : Z + 3], int(plan.settings[STRIDE])
-    for j in range(work.correction.shape[0]):
-        work.correction[j] += k[0, j] * z[0] + k[1, j] * z[1] + k[2, j] * z[2]
+    k, z, stride = further.vectors[K], residual[Z : Z + 3], int(plan.settings[STRIDE])
+    for j in range(further.correction.shape[0]):
+        further.correction[j] += k[0, j] * z[0] + k[1, j] * z[1] + k[2, j] * z[2]
     for s in range(plan.spans.shape[0]):
         if state.silent[0, s] >= 0.0:
             continue
         first, last = plan.spans[s, 0], plan.spans[s, 1]
-        own = work.residuals[row, OWNER] == s and last - first > 1
+        own = residual[OWNER] == s and last - first > 1
         m0, m1, m2 = 0.0, 0.0, 0.0
         if own:
             for i in range(first, last):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.kernels.resample import assemble, covered_until
+from polyins.kernels.resample import Waiting, assemble, covered_until
 from polyins.model.recording import usual_interval
 from polyins.prepare.timesync import GAP
 
@@ -288,18 +288,8 @@ class Assembly:
         increments, missing = np.empty((self.count, 6)), np.empty(self.count, dtype=bool)
         begin, self.now = self.now, end
         self.silent = self.ends < end
-        assemble(
-            self.stamps,
-            self.values,
-            self.first,
-            self.last,
-            self.before,
-            GAP * self.nominal,
-            begin,
-            end,
-            increments,
-            missing,
-        )
+        waiting = Waiting(self.stamps, self.values, self.first, self.last, self.before)
+        assemble(waiting, GAP * self.nominal, begin, end, increments, missing)
         self._look()
         increments = np.ascontiguousarray(increments.T)
         if not missing.any():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.model.rig import Imu, Rig
+from polyins.model.rig import Rig
 from polyins.prepare.timesync import Aligned
 
 Array = NDArray[np.float64]
@@ -40,33 +40,26 @@ def completed(rig: Rig, aligned: Aligned, errors: Array) -> Aligned:
     """
     if not aligned.missing.any():
         return aligned
-    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])
     found = aligned.increments.copy()
     for group in groups(rig):
         for i in group:
             others = [j for j in group if j != i]
             epochs = np.flatnonzero(aligned.missing[:, i] & ~aligned.missing[:, others].all(axis=1))
             if len(epochs):
-                part = aligned.increments[epochs][:, :, others]
-                have = ~aligned.missing[epochs][:, others]
-                found[epochs, :, i] = _from_others(i, others, rig.imus, part, intervals[epochs, None], have, errors)
+                found[epochs, :, i] = _from_others(i, others, epochs, rig, aligned, errors)
     return replace(aligned, increments=found)
 
 
 def _from_others(
-    i: int,
-    others: list[int],
-    imus: tuple[Imu, ...],
-    increments: Array,
-    intervals: Array,
-    have: NDArray[np.bool_],
-    errors: Array,
+    i: int, others: list[int], epochs: NDArray[np.intp], rig: Rig, aligned: Aligned, errors: Array
 ) -> Array:
-    """Return what IMU i would measure, shape (K, 6)."""
+    """Return what IMU i would measure in K epochs, shape (K, 6)."""
+    intervals = np.diff(aligned.time, prepend=2.0 * aligned.time[0] - aligned.time[1])[epochs, None]
+    have = ~aligned.missing[epochs][:, others]
     weights = have / have.sum(axis=1, keepdims=True)
-    found = np.einsum("tkj,tj->tk", increments, weights)
+    found = np.einsum("tkj,tj->tk", aligned.increments[epochs][:, :, others], weights)
     found -= weights @ (errors[others, :6] - errors[i, :6]) * intervals
-    spots = np.array([imu.position if imu.wheel is None else -imu.wheel.lever_arm for imu in imus])
+    spots = np.array([imu.position if imu.wheel is None else -imu.wheel.lever_arm for imu in rig.imus])
     apart = spots[i] - weights @ spots[others]
     rate = found[:, :3] / intervals - errors[i, :3]
     found[:, 3:] += np.cross(rate, np.cross(rate, apart)) * intervals
