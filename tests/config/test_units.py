@@ -48,7 +48,6 @@ standstill = st.builds(StandstillOptions, positive, positive, positive)
 filters = st.builds(
     FilterOptions,
     gate_limit=st.none() | positive,
-    gate_reopen_after=st.integers(1, 99),
     gnss_snap=st.floats(0.0, 0.1),
     gravity=positive,
     rolling=rolling,
@@ -235,7 +234,6 @@ def test_every_field_has_a_key_and_every_key_reaches_one(section, kind):
         ("rectification_mg_g2", "rectification", 1e-3 / 9.80665),
         ("accel_lsb_mg", "accel_lsb", 9.80665e-3),
         ("radius_std", "radius_std", 1.0),
-        ("gate_reopen_after", "gate_reopen_after", 1.0),
     ],
 )
 def test_the_unit_stands_in_the_key(key, name, factor):

@@ -46,7 +46,7 @@ def test_a_run_document_has_all_keys_and_the_figures():
     assert document["gnss"] == {
         "fixes": 59,
         "rejected": 1,
-        "reopened": 0,
+        "resets": 0,
         "velocities_rejected": 0,
         "rejected_times_s": [1005.0],
     }

@@ -99,7 +99,7 @@ def test_innovations_say_what_each_fix_brought(recording: Recording) -> None:
     innovations = batch.run(recording, "enav-fusion").innovations
     np.testing.assert_array_equal(innovations.time, recording.gnss.time)
     assert innovations.accepted.all()
-    assert not innovations.reopened.any()
+    assert not innovations.reset.any()
     assert np.all(innovations.std > recording.gnss.position_std)
     assert np.all(innovations.nis > 0.0)
     # the diagonal alone gives the same to a factor

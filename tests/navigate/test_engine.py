@@ -452,8 +452,8 @@ def test_over_two_hours_the_covariance_stays_symmetric_and_positive(method: str)
 
 # --- the gate ---------------------------------------------------------------------------------------------------------
 
-EVERY_HALF_SECOND = np.arange(0.5, 6.0, 0.5)  # at epochs: a fix that is rejected then leaves no trace, not even a split
-GATED = FilterOptions(gate_limit=100.0, gate_reopen_after=3)
+EVERY_HALF_SECOND = np.arange(0.5, 6.0, 0.5)
+GATED = FilterOptions(gate_limit=100.0)
 
 
 def shifted(recording: Recording, which: slice | list[int], metres: Array) -> Recording:
@@ -469,11 +469,11 @@ def gated(count: int = 3, *, options: FilterOptions = GATED) -> Recording:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_lying_fix_is_rejected_and_leaves_no_trace(method: str) -> None:
+def test_a_lying_fix_weighs_nearly_nothing(method: str) -> None:
     recording = gated()
     lied = batch.run(shifted(recording, [6], np.array([50.0, 0.0, 0.0])), method)
     np.testing.assert_array_equal(np.flatnonzero(~lied.innovations.accepted), [6])
-    assert not lied.innovations.reopened.any()
+    assert not lied.innovations.reset.any()
     assert lied.innovations.nis[6] > 100.0
     assert lied.innovations.residual[6, 0] == pytest.approx(-50.0, abs=1.0)
 
@@ -483,32 +483,59 @@ def test_a_lying_fix_is_rejected_and_leaves_no_trace(method: str) -> None:
 
     assert recording.gnss is not None
     missing = batch.run(replace(recording, gnss=without(recording.gnss)), method)
-    for name in WRITTEN:
-        np.testing.assert_array_equal(getattr(lied, name), getattr(missing, name), err_msg=name)
+    off = (lied.position - missing.position) * metres_per_unit(lied.position[0], True)
+    assert np.abs(off).max() < 0.03
+    assert np.abs(lied.velocity - missing.velocity).max() < 0.03
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_lasting_jump_is_believed_after_that_many_rejections(method: str) -> None:
-    jump = np.array([0.0, 50.0, 0.0])
-    solution = batch.run(shifted(gated(), slice(4, None), jump), method)
-    np.testing.assert_array_equal(np.flatnonzero(~solution.innovations.accepted), [4, 5, 6])
-    np.testing.assert_array_equal(np.flatnonzero(solution.innovations.reopened), [7])
-    assert np.abs(solution.innovations.residual[8:]).max() < 2.0
-    assert np.abs(solution.innovations.residual[7]).max() > 45.0
+def test_a_lasting_jump_is_followed_by_the_position_alone(method: str) -> None:
+    """After ten seconds, of a jump below 20 m; velocity, attitude and biases stay what they were."""
+    fixes = np.arange(0.5, 16.0, 0.5)
+    recording = replace(shaken_recording(3, 16.0, fixes=fixes, equal=True), options=GATED)
+    jump = np.array([0.0, 8.0, 0.0])
+    solution, free = batch.run(shifted(recording, slice(4, None), jump), method), batch.run(recording, method)
+    (when,) = np.flatnonzero(solution.innovations.reset)
+    assert solution.innovations.time[when] - solution.innovations.time[4] == pytest.approx(10.0, abs=0.51)
+    np.testing.assert_array_equal(np.flatnonzero(~solution.innovations.accepted), np.arange(4, when))
+    assert np.abs(solution.innovations.residual[when, 1]) > 7.0
+    assert np.abs(solution.innovations.residual[when + 1 :]).max() < 0.5
+    k = np.searchsorted(solution.time, solution.innovations.time[when])
+    moved = (solution.position[k] - solution.position[k - 1]) * metres_per_unit(solution.position[0], True)
+    assert moved[1] > 7.0
+    assert np.abs(solution.velocity - free.velocity).max() < 0.3
+    turned = 2.0 * np.arccos(np.minimum(1.0, np.abs(np.sum(solution.attitude * free.attitude, axis=1))))
+    assert np.degrees(turned).max() < 0.5
 
 
-def test_rejections_are_counted_in_a_row() -> None:
-    """Two lies, a good fix, two lies: nothing is believed."""
-    solution = batch.run(shifted(gated(), [3, 4, 6, 7], np.array([50.0, 0.0, 0.0])), "enav-fusion")
-    np.testing.assert_array_equal(np.flatnonzero(~solution.innovations.accepted), [3, 4, 6, 7])
-    assert not solution.innovations.reopened.any()
+def test_lies_apart_do_not_add_up() -> None:
+    """Two lies, good fixes, a lie: nothing is believed."""
+    solution = batch.run(shifted(gated(), [3, 4, 9], np.array([50.0, 0.0, 0.0])), "enav-fusion")
+    np.testing.assert_array_equal(np.flatnonzero(~solution.innovations.accepted), [3, 4, 9])
+    assert not solution.innovations.reset.any()
+
+
+def test_noise_that_is_not_stated_is_found_and_used() -> None:
+    """A metre of noise stated as two centimetres."""
+    rng = np.random.default_rng(8)
+    fixes = np.arange(0.5, 40.0, 0.5)
+    recording = replace(shaken_recording(3, 40.0, fixes=fixes, equal=True), options=GATED)
+    noisy = recording
+    for k in range(20, len(fixes)):
+        noisy = shifted(noisy, [k], rng.normal(0.0, 1.0, 3))
+    found = batch.run(noisy, "enav-fusion").innovations
+    assert found.noise_ratio is not None
+    assert (found.noise_ratio[:20] == 1.0).all()
+    late = found.noise_ratio[32:] * recording.gnss.position_std[32:, 0] ** 2
+    assert np.median(late) == pytest.approx(1.0, rel=0.8)
+    assert (found.nis[32:] / 3.0).mean() < 4.0
 
 
 def test_without_a_gate_every_fix_is_believed() -> None:
     lied = shifted(gated(options=FilterOptions(gate_limit=None)), [6], np.array([50.0, 0.0, 0.0]))
     solution = batch.run(lied, "enav-fusion")
     assert solution.innovations.accepted.all()
-    assert not solution.innovations.reopened.any()
+    assert not solution.innovations.reset.any()
     at = np.searchsorted(solution.time, EVERY_HALF_SECOND[6])
     moved = (solution.position[at] - solution.position[at - 1]) * metres_per_unit(solution.position[0], True)
     assert moved[0] > 10.0
@@ -520,7 +547,7 @@ def test_good_data_pass_a_narrow_gate(method: str) -> None:
     truth = shaken_path(60.0)
     times = np.arange(0.5, 60.0, 0.5)
     recording = shaken_recording(3, 60.0, fixes=times, truth=truth, rate_hz=100.0, equal=True, spread=0.01, seed=3)
-    options = FilterOptions(gate_limit=22.0, gate_reopen_after=3)  # exceeded by chance once in 15,000 fixes
+    options = FilterOptions(gate_limit=22.0)  # exceeded by chance once in 15,000 fixes
     solution = batch.run(replace(recording, options=options), method)
     assert solution.innovations.accepted.all()
     # an array's errors average, which its covariance does not say
@@ -528,7 +555,7 @@ def test_good_data_pass_a_narrow_gate(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_wrong_velocity_is_refused_and_its_position_used(method: str) -> None:
+def test_a_wrong_velocity_weighs_nearly_nothing_and_its_position_is_used(method: str) -> None:
     truth = shaken_path(6.0)
     recording = gated()
     gnss = received(truth, ANTENNA, EVERY_HALF_SECOND, 1)
@@ -536,17 +563,17 @@ def test_a_wrong_velocity_is_refused_and_its_position_used(method: str) -> None:
     lying = gnss.velocity.copy()
     lying[6] += [0.0, 20.0, 0.0]
     lied = advanced_with(replace(recording, gnss=replace(gnss, velocity=lying)), method)
-    for kind, rejected in ((kinds.GNSS_POSITION, []), (kinds.GNSS_VELOCITY, [6])):
+    for kind, doubted in ((kinds.GNSS_POSITION, []), (kinds.GNSS_VELOCITY, [6])):
         status = lied.outputs.event_status[of_kind(lied, kind)]
-        np.testing.assert_array_equal(np.flatnonzero(status == update.REJECTED), rejected)
-        assert np.count_nonzero(status == update.ACCEPTED) == len(EVERY_HALF_SECOND) - len(rejected)
+        np.testing.assert_array_equal(np.flatnonzero(status == update.DEWEIGHTED), doubted)
+        assert np.count_nonzero(status == update.ACCEPTED) == len(EVERY_HALF_SECOND) - len(doubted)
     wrong = EVERY_HALF_SECOND[6]
 
     def drop(run: batch.Prepared) -> batch.Prepared:
         return with_events(run, ~(of_kind(run, kinds.GNSS_VELOCITY) & (run.inputs.event_time == wrong)))
 
     missing = advanced_with(replace(recording, gnss=gnss), method, drop)
-    np.testing.assert_array_equal(lied.outputs.states[1:], missing.outputs.states[1:])
+    assert np.abs(lied.outputs.states[1:, 3:6] - missing.outputs.states[1:, 3:6]).max() < 0.02
 
 
 def advanced_with(
@@ -557,10 +584,10 @@ def advanced_with(
     return run
 
 
-def test_a_rejected_position_takes_its_velocity_with_it() -> None:
+def test_a_doubted_position_takes_its_velocity_with_it() -> None:
     recording = replace(gated(), gnss=received(shaken_path(6.0), ANTENNA, EVERY_HALF_SECOND, 1))
     run = advanced_with(shifted(recording, [6], np.array([50.0, 0.0, 0.0])), "enav-fusion")
-    assert run.outputs.event_status[of_kind(run, kinds.GNSS_POSITION)][6] == update.REJECTED
+    assert run.outputs.event_status[of_kind(run, kinds.GNSS_POSITION)][6] == update.DEWEIGHTED
     assert run.outputs.event_status[of_kind(run, kinds.GNSS_VELOCITY)][6] == update.UNUSED
 
 

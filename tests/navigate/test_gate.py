@@ -41,7 +41,7 @@ def test_misaligned_chips_reject_no_good_fix() -> None:
         runs += [innovations(recording, method) for method in ("imu-fusion", "nav-fusion", "enav-fusion")]
         for run in runs:
             assert run.accepted.all()
-            assert not run.reopened.any()
+            assert not run.reset.any()
         beyond += sum(np.count_nonzero(run.nis > recording.options.gate_limit) for run in runs)
     assert beyond > 3
 
@@ -57,4 +57,4 @@ def test_misaligned_chips_still_tell_a_lie(method: str) -> None:
     for times, metres in ((ends, 300.0), (between, 1.5)):
         run = innovations(lying(recording, times, metres), method)
         np.testing.assert_array_equal(run.time[~run.accepted], times)
-        assert not run.reopened.any()
+        assert not run.reset.any()

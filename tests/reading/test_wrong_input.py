@@ -395,11 +395,6 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
         "expected both or neither",
     ),
     "gate": (setting("filter", "gate_limit", to=-3), r"filter\.gate_limit: is -3", "expected a number above zero"),
-    "reopening": (
-        setting("filter", "gate_reopen_after", to=0),
-        r"filter\.gate_reopen_after: is 0",
-        "expected greater than",
-    ),
 }
 
 

@@ -40,8 +40,8 @@ class Kind:
     axes: tuple[str, ...]
     """of its residual; those of the kinds with fewer than three come first"""
     joined: Literal[0, 1, 2] = MEAN
-    reopens: bool = False
-    """whether after several rejections in a row the next one is believed and the covariance grows to match"""
+    deweights: bool = False
+    """whether one that the gate does not pass is taken all the same, with the variance of its own innovation"""
     in_vehicle: bool = False
     """whether it depends on the attitude of the vehicle, beyond that of the IMU"""
     offset: str = ""
@@ -51,21 +51,21 @@ class Kind:
 NORTH_EAST_DOWN, FORWARD_RIGHT_DOWN = ("north", "east", "down"), ("forward", "right", "down")
 
 KINDS = (
-    Kind("GNSS position", "m", NORTH_EAST_DOWN, reopens=True, in_vehicle=True),
-    Kind("GNSS velocity", "m/s", NORTH_EAST_DOWN, in_vehicle=True),
+    Kind("GNSS position", "m", NORTH_EAST_DOWN, deweights=True, in_vehicle=True),
+    Kind("GNSS velocity", "m/s", NORTH_EAST_DOWN, deweights=True, in_vehicle=True),
     Kind("wheel speed", "m/s", FORWARD_RIGHT_DOWN, joined=EACH, in_vehicle=True),
     Kind("reference point", "m", NORTH_EAST_DOWN, joined=DIFFERENCES, in_vehicle=True),
     Kind("zero velocity", "m/s", NORTH_EAST_DOWN, joined=EACH),
     Kind("zero rate", "rad/s", ("x", "y", "z"), joined=EACH),
-    Kind("height", "m", ("down",), in_vehicle=True, offset="height_bias"),
-    Kind("heading", "rad", ("about down",), in_vehicle=True, offset="heading_offset"),
-    Kind("odometer", "m/s", FORWARD_RIGHT_DOWN, in_vehicle=True, offset="speed_scale"),
+    Kind("height", "m", ("down",), deweights=True, in_vehicle=True, offset="height_bias"),
+    Kind("heading", "rad", ("about down",), deweights=True, in_vehicle=True, offset="heading_offset"),
+    Kind("odometer", "m/s", FORWARD_RIGHT_DOWN, deweights=True, in_vehicle=True, offset="speed_scale"),
     # not a measurement: from here on the mean speed of the next one is taken
     Kind("window", "", ()),
 )
 
 JOINED = tuple(kind.joined for kind in KINDS)
-REOPENS = tuple(kind.reopens for kind in KINDS)
+DEWEIGHTS = tuple(kind.deweights for kind in KINDS)
 IN_VEHICLE = tuple(kind.in_vehicle for kind in KINDS)
 
 

@@ -39,11 +39,8 @@ class Filter(Section):
     """What the filter is told beyond the sensors."""
 
     gate_limit: Positive | None = FilterOptions.gate_limit
-    """a fix is rejected whose normalized innovation squared, at fourfold prediction std, exceeds
-    this; the larger, the fewer are; null: none is"""
-    gate_reopen_after: Annotated[int, Field(ge=1, strict=True)] = FilterOptions.gate_reopen_after
-    """after that many rejections in a row the next fix is believed; the larger, the longer a wrong state
-    keeps good fixes out"""
+    """a measurement weighs less whose normalized innovation squared, at fourfold prediction std,
+    exceeds this; the larger, the fewer do; null: none does, and no receiver is doubted"""
     gnss_snap_s: Annotated[float, BeforeValidator(number), Field(ge=0.0, le=0.1)] = FilterOptions.gnss_snap
     """a fix nearer than this to an IMU epoch is applied at that epoch, s; the larger, the fewer intervals are split,
     and the farther a fix is moved"""

@@ -49,7 +49,7 @@ class GnssCounts(TypedDict):
 
     fixes: int
     rejected: int
-    reopened: int
+    resets: int
     velocities_rejected: int
     rejected_times_s: NotRequired[list[float]]
 
@@ -59,7 +59,7 @@ class MeasurementCounts(TypedDict):
 
     count: int
     rejected: int
-    reopened: int
+    resets: int
     mean_nis: float | None
 
 

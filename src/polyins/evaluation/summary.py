@@ -37,7 +37,7 @@ from polyins.version import __version__
 Array = NDArray[np.float64]
 BETTER = 1.1
 """times the error of one IMU alone, above which a method is worse than it"""
-GNSS_COUNTS = ("fixes", "rejected", "reopened", "velocities_rejected")
+GNSS_COUNTS = ("fixes", "rejected", "resets", "velocities_rejected")
 
 
 def summarize(solution: Solution, reference: Reference | None, outages: Sequence[Interval] = ()) -> RunDocument:
@@ -225,7 +225,7 @@ def _gnss(innovations: Innovations) -> dict[str, object]:
     return {
         "fixes": innovations.time.size,
         "rejected": int(np.count_nonzero(rejected)),
-        "reopened": int(np.count_nonzero(innovations.reopened)),
+        "resets": int(np.count_nonzero(innovations.reset)),
         "velocities_rejected": int(np.count_nonzero(innovations.velocity_rejected)),
         "rejected_times_s": innovations.time[rejected],
     }
@@ -238,7 +238,7 @@ def _measured(innovations: Innovations) -> MeasurementCounts:
     return {
         "count": innovations.time.size,
         "rejected": int(np.count_nonzero(~accepted)),
-        "reopened": int(np.count_nonzero(innovations.reopened)),
+        "resets": int(np.count_nonzero(innovations.reset)),
         "mean_nis": float(innovations.nis[accepted].sum() / degrees) if degrees else None,
     }
 

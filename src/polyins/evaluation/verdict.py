@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from polyins.evaluation.documents import CoverageFigures
 from polyins.evaluation.figures import Epochs, Figures
 from polyins.evaluation.outages import partly_covered
+from polyins.evaluation.receiver import of_receiver
 from polyins.model.findings import Finding, Severity, Verdict
 from polyins.model.solution import Innovations, Solution
 
@@ -109,9 +110,11 @@ def _of_reference(figures: Figures) -> Iterator[Finding]:
 
 
 def _of_kind(kind: str, measured: Innovations) -> Iterator[Finding]:
-    resets = int(np.count_nonzero(measured.reopened))
+    if measured.change is not None:
+        yield from of_receiver(kind, measured)
+    resets = int(np.count_nonzero(measured.reset))
     if resets:
-        when = measured.time[measured.reopened]
+        when = measured.time[measured.reset]
         yield Finding(
             "reset",
             f"{kind}: {resets} reset(s) of the state to it, the first at {when[0]:.2f} s",

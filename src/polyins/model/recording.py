@@ -185,11 +185,9 @@ class FilterOptions:
     """What the filter is told beyond the rig."""
 
     gate_limit: float | None = 100.0
-    """A fix is rejected whose normalized innovation squared, with the prediction's std taken `engine.CAUTION`-fold,
-    exceeds this; None: no gate. Errors beyond the model, such as misaligned chips', make good fixes exceed ten of the
-    filter's own sigma after an outage or in a bend, but not ten of four times these."""
-    gate_reopen_after: int = 3
-    """After that many rejections in a row the next fix is believed and the covariance grows to match."""
+    """A measurement weighs less whose normalized innovation squared, with the prediction's std taken
+    `update.CAUTION`-fold, exceeds this; None: no gate. Errors beyond the model, such as misaligned chips', make good
+    fixes exceed ten of the filter's own sigma after an outage or in a bend, but not ten of four times these."""
     gnss_snap: float = 1e-4
     """s: a fix nearer than this to an IMU epoch is applied at that epoch; otherwise the interval is split."""
     gravity: float = 9.80665

@@ -28,20 +28,27 @@ class Innovations:
     nis: Array
     """normalized innovation squared, shape (M,)"""
     accepted: NDArray[np.bool_]
-    """False where the gate rejected the measurement, shape (M,)"""
-    reopened: NDArray[np.bool_]
-    """True where it was believed because it followed a run of rejections, shape (M,)"""
+    """False where the gate did not take the measurement as it is: it weighed less, or nothing; shape (M,)"""
+    reset: NDArray[np.bool_]
+    """True where the position was set to it because it kept to an offset for long, shape (M,)"""
     velocity_rejected: NDArray[np.bool_]
     """True where a position was accepted and the velocity of the same fix was not, shape (M,)"""
     rows: NDArray[np.intp]
     """degrees of freedom of the NIS, shape (M,)"""
+    change: Array | None = None
+    """of a position: how the receiver moved since the fix before, otherwise than the IMUs did, m, shape (M, 3)"""
+    noise_ratio: Array | None = None
+    """of a position: the variance that was found from fix to fix and used, over the stated one, or 1; shape (M,)"""
+    velocity: Array | None = None
+    """of a position: m/s north, east, down, of the state then, shape (M, 3)"""
     axes: tuple[str, ...] = ("north", "east", "down")
     unit: str = "m"
 
     @classmethod
     def joined(cls, parts: Sequence[Innovations]) -> Innovations:
         """Return those of parts of a recording that follow one another."""
-        names = ("time", "residual", "std", "nis", "accepted", "reopened", "velocity_rejected", "rows")
+        names = ["time", "residual", "std", "nis", "accepted", "reset", "velocity_rejected", "rows"]
+        names += [name for name in ("change", "noise_ratio", "velocity") if getattr(parts[0], name) is not None]
         whole: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return replace(parts[0], **whole)
 
@@ -53,7 +60,7 @@ NO_INNOVATIONS = Innovations(
     std=np.zeros((0, 3)),
     nis=np.zeros(0),
     accepted=_NEVER,
-    reopened=_NEVER,
+    reset=_NEVER,
     velocity_rejected=_NEVER,
     rows=np.zeros(0, dtype=np.intp),
 )

@@ -19,7 +19,7 @@ from polyins.model.recording import Recording
 from polyins.model.solution import Innovations, OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.model.status import patience, status_of
-from polyins.navigate import engine, events, layout, update
+from polyins.navigate import engine, events, layout, receiver, update
 from polyins.navigate import start as search
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
@@ -269,7 +269,7 @@ def empty_outputs(inputs: Inputs, plan: Plan, errors: int) -> Outputs:
         states=np.empty((epochs, 10)),
         variances=np.empty((epochs, 12)),
         event_status=np.zeros(count, dtype=np.int8),
-        innovations=np.zeros((count, 7)),
+        innovations=np.zeros((count, places.INNOVATION)),
         log_time=np.empty(log_rows),
         log=np.empty((log_rows, 2, errors, imus)),
     )
@@ -321,7 +321,7 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
 def _status(run: Prepared, track: Trajectory) -> NDArray[np.uint8]:
     """Return what each state is worth, and note when the run was aided last."""
     kind, taken = run.inputs.event_kind, run.outputs.event_status
-    believed = np.isin(kind, AIDING) & np.isin(taken, (update.ACCEPTED, update.REOPENED))
+    believed = np.isin(kind, AIDING) & np.isin(taken, (update.ACCEPTED, update.RESET))
     times = np.concatenate([run.aided, run.inputs.event_time[believed]])
     last = np.maximum(np.searchsorted(times, track.time + run.recording.options.gnss_snap, "right") - 1, 0)
     found = status_of(track, times[last], patience(np.diff(times)))
@@ -338,7 +338,7 @@ def innovations_of(run: Prepared) -> dict[str, Innovations]:
     """Return what became of the measurements, by kind; of GNSS positions in any case."""
     queue, outputs = Events(*run.inputs[4:8]), run.outputs
     velocity = np.flatnonzero(queue.kind == kinds.GNSS_VELOCITY)
-    lost = queue.time[velocity][outputs.event_status[velocity] == update.REJECTED]
+    lost = queue.time[velocity][outputs.event_status[velocity] != update.ACCEPTED]
     found = {}
     for number, kind in enumerate(kinds.KINDS):
         shown = np.flatnonzero((queue.kind == number) & (outputs.event_status != update.UNUSED))
@@ -353,14 +353,21 @@ def innovations_of(run: Prepared) -> dict[str, Innovations]:
             residual=rows[:, :axes],
             std=np.sqrt(rows[:, 3 : 3 + axes]),
             nis=rows[:, 6],
-            accepted=status != update.REJECTED,
-            reopened=status == update.REOPENED,
+            accepted=np.isin(status, (update.ACCEPTED, update.RESET)),
+            reset=status == update.RESET,
             velocity_rejected=np.isin(queue.time[shown], lost) if of_fix else np.zeros(len(shown), dtype=bool),
+            change=rows[:, receiver.D : receiver.D + axes] if of_fix else None,
+            noise_ratio=rows[:, receiver.NOISE] if of_fix else None,
+            velocity=_velocity_at(run, queue.time[shown]) if of_fix else None,
             rows=(queue.variance[shown] > 0.0).sum(axis=1),
             axes=kind.axes,
             unit=kind.unit,
         )
     return found
+
+
+def _velocity_at(run: Prepared, time: Array) -> Array:
+    return run.outputs.states[np.clip(np.searchsorted(run.inputs.time, time), 1, len(run.inputs.time) - 1), 3:6]
 
 
 def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, OffsetEstimate]:

@@ -218,7 +218,7 @@ def aid(navigators: Navigators, further: Further | None, inputs: Inputs, outputs
     elif _complete(state, plan, measurement, kind):
         status = update.apply(state, plan, work, further, outputs.innovations[j])
     if kind == kinds.GNSS_POSITION:
-        state.scalars[REJECTED_AT] = inputs.event_time[j] if status == update.REJECTED else -math.inf
+        state.scalars[REJECTED_AT] = inputs.event_time[j] if status == update.DEWEIGHTED else -math.inf
     outputs.event_status[j] = status
 
 

@@ -240,7 +240,6 @@ def _plan(row: Method, choice: Choice, seats: Bank, recording: Recording, rows: 
     settings[places.VIRTUAL] = row.bank == "mean"
     settings[places.SHARED_MECHANIZATION] = row.shared_mechanization
     settings[places.GATE_LIMIT] = np.inf if options.gate_limit is None else options.gate_limit
-    settings[places.REOPEN_AFTER] = options.gate_reopen_after
     settings[places.SNAP] = options.gnss_snap
     settings[places.LOG_EVERY] = 1
     settings[places.STRIDE] = stride

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from polyins.aiding import kinds, measurement
+from polyins.aiding import measurement
 from polyins.kernels import bank, covariance, fuse, kalman, layout
 from polyins.kernels.jit import Array
 from polyins.kernels.layout import Layout
@@ -25,8 +25,8 @@ TIME = _take(1)  # of the state, s
 INTERVAL = _take(1)  # length of the last interval, s
 NEXT_EVENT = _take(1)  # its index
 NEXT_LOG = _take(1)  # row of the log
-REJECTIONS = _take(len(kinds.KINDS))  # in a row, by kind
-REJECTED_AT = _take(1)  # time of the last GNSS position that was rejected, s
+REJECTED_AT = _take(1)  # time of the last GNSS position that was not taken as it is, s
+RECEIVER = _take(48)  # how far its positions are believed, see `navigate.receiver`
 AT_REST = _take(1)  # whether the vehicle stood in the last window
 WINDOW_BEGIN = _take(1)  # s; of the window over which a mean speed or rate is taken
 WINDOW_FILLED = _take(1)  # epochs in it; below zero: none is open
@@ -41,7 +41,6 @@ SCALARS = _layout.size
     VIRTUAL,  # average the IMUs into one before navigation
     SHARED_MECHANIZATION,
     GATE_LIMIT,
-    REOPEN_AFTER,  # rejections in a row
     SNAP,  # s: an event this near to an epoch is at it
     LOG_EVERY,  # epochs between rows of the log of IMU errors
     STRIDE,  # length of a row of P
@@ -49,8 +48,11 @@ SCALARS = _layout.size
     STILL_RATE,  # rad/s: an IMU that turns more does not stand
     RADIUS,  # m, mean of the wheels that give the speed
     SPEED_AT_END,  # predict the velocity at the end of a window instead of the mean
-) = range(11)
-SETTINGS = 11
+) = range(10)
+SETTINGS = 10
+
+INNOVATION = 11
+"""numbers that are told of an event"""
 
 VALUES = measurement.VARIANCE - measurement.VALUE
 """numbers that the value of an event may have"""
@@ -121,7 +123,8 @@ class Outputs(NamedTuple):
     event_status: Array
     """int8 (M,)"""
     innovations: Array
-    """(M, 7): residual 3, its variance 3, NIS"""
+    """(M, INNOVATION): residual 3, its variance 3, NIS; of a GNSS position its change since the last one 3, and the
+    ratio of the variance that was used to the stated one"""
     log_time: Array
     """s (K,)"""
     log: Array
@@ -139,6 +142,8 @@ class Work(NamedTuple):
     """(blocks, kalman.SIZE)"""
     measurement: Array
     """(measurement.SIZE,)"""
+    noise: Array
+    """(3,): the variances with which an innovation was recorded"""
     residuals: Array
     """(blocks, 8) of one event's measurements: residual, its variances; the block whose members differ from it, or -1;
     which of `updates` is its own"""
@@ -197,6 +202,7 @@ def empty_work(blocks: int, joined: bool) -> Work:
         sums=layout.zeros(blocks, fuse.SUMS),
         updates=layout.zeros(blocks, kalman.SIZE),
         measurement=layout.zeros(measurement.SIZE),
+        noise=layout.zeros(3),
         residuals=np.zeros((blocks, 8)),
     )
 

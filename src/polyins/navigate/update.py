@@ -6,19 +6,20 @@ paper B's centralized filter.
 
 from __future__ import annotations
 
+import math
+
 from polyins.aiding import kinds, vehicle_attitude
 from polyins.aiding.measurement import KIND, METRIC, VARIANCE
 from polyins.kernels import bank, covariance, earth, fuse, joint, kalman, strapdown, vehicle
 from polyins.kernels.bank import LANES
 from polyins.kernels.covariance import LARGEST, P
 from polyins.kernels.jit import Array, scalar_kernel
-from polyins.navigate import window
+from polyins.navigate import receiver, window
 from polyins.navigate.state import (
     EARTH,
     GATE_LIMIT,
     INTERVAL,
-    REJECTIONS,
-    REOPEN_AFTER,
+    RECEIVER,
     STRIDE,
     TIME,
     Further,
@@ -27,15 +28,16 @@ from polyins.navigate.state import (
     Work,
 )
 
-UNUSED, ACCEPTED, REJECTED, REOPENED = 0, 1, 2, 3
-"""What became of a measurement."""
+UNUSED, ACCEPTED, REJECTED, RESET, DEWEIGHTED = 0, 1, 2, 3, 4
+"""What became of a measurement: taken as it is; not taken; taken for the position, whatever the prediction; taken with
+the variance of its own innovation."""
 
 CAUTION = 4.0
 """The gate takes the standard deviations of the prediction times this: P knows nothing of misaligned chips and the
 like, which in an outage or a bend make errors of many sigma."""
 
-MOST_GROWTH = 100.0
-"""of the covariance when the gate reopens: standard deviations tenfold"""
+OWN_SHARE = 0.1
+"""of the variance of a fix that joined blocks have apart after a reset to it"""
 
 HP, K, AH = range(3)
 """places in `Further.vectors`"""
@@ -47,7 +49,7 @@ NIS = 6
 
 @scalar_kernel
 def apply(state: State, plan: Plan, work: Work, further: Further | None, innovation: Array) -> int:
-    """Measure with all blocks, write the innovation, and correct them unless the gate rejects it; return its status."""
+    """Measure with all blocks, write the innovation, and correct them as far as it is believed; return its status."""
     if state.blocks.shape[0] == plan.spans.shape[0]:
         vehicle.update_attitudes(state.rows, state.blocks, plan.spans, plan.lenders)
     if further is None:
@@ -63,11 +65,18 @@ def _apply_apart(state: State, plan: Plan, work: Work, innovation: Array) -> int
     if rows == 0:
         return UNUSED
     _record(work, innovation, rows)
-    status = _decide(state, plan, work, rows, innovation[NIS])
-    if status == REOPENED:
-        _reopen_each(state, plan, work, rows, innovation[NIS])
-    if status != REJECTED:
+    if _uses_other_noise(state, plan, work, innovation):
+        rows = _measure_each(state, plan, work)
+        _record(work, innovation, rows)
+    status = _decide(state, plan, work, rows, innovation)
+    if status == DEWEIGHTED:
+        rows = _measure_each(state, plan, work)
+    if status == RESET:
+        _reset_each(state, plan, work, rows)
+    elif status != REJECTED:
         _correct_each(state, plan, work)
+    _note(state, work, innovation, status)
+    if status != REJECTED:
         window.begin_anew(state, plan, state.scalars[TIME])
     return status
 
@@ -78,11 +87,18 @@ def _apply_joined(state: State, plan: Plan, work: Work, further: Further, innova
     if rows == 0:
         return UNUSED
     _record(work, innovation, rows)
-    status = _decide(state, plan, work, rows, innovation[NIS])
-    if status == REOPENED:
-        _reopen_joint(state, plan, work, further, innovation[NIS])
-    if status != REJECTED:
+    if _uses_other_noise(state, plan, work, innovation):
+        rows = _measure_joint(state, plan, work, further)
+        _record(work, innovation, rows)
+    status = _decide(state, plan, work, rows, innovation)
+    if status == DEWEIGHTED:
+        rows = _measure_joint(state, plan, work, further)
+    if status == RESET:
+        _reset_joint(state, plan, work, further)
+    elif status != REJECTED:
         _correct_joint(state, plan, work, further, rows)
+    _note(state, work, innovation, status)
+    if status != REJECTED:
         window.begin_anew(state, plan, state.scalars[TIME])
     return status
 
@@ -243,75 +259,133 @@ def _gain_of_row(state: State, work: Work, further: Further, row: int) -> None:
 @scalar_kernel
 def _record(work: Work, innovation: Array, rows: int) -> None:
     """Write the mean residual and its variance over what was measured, and the mean NIS."""
-    innovation[:] = 0.0
+    for a in range(NIS + 1):
+        innovation[a] = 0.0
     for row in range(rows):
         update = work.updates[int(work.residuals[row, UPDATE])]
         for a in range(kalman.ROWS):
             innovation[a] += update[kalman.RESIDUAL + a] / rows
             innovation[3 + a] += update[kalman.S + 4 * a] / rows
         innovation[NIS] += kalman.normalized_innovation_squared(update) / rows
+    for a in range(kalman.ROWS):
+        work.noise[a] = work.measurement[VARIANCE + a]
 
 
 @scalar_kernel
-def _decide(state: State, plan: Plan, work: Work, rows: int, nis: float) -> int:
-    """Return whether a measurement is accepted, rejected, or believed after several that were rejected."""
-    kind = int(work.measurement[KIND])
-    rejections = REJECTIONS + kind
-    if _passes_gate(plan, work, rows, nis):
-        state.scalars[rejections] = 0.0
+def _uses_other_noise(state: State, plan: Plan, work: Work, innovation: Array) -> bool:
+    """Whether a receiver is noisier than it states; its measurement then has the variances that were found."""
+    if int(work.measurement[KIND]) != kinds.GNSS_POSITION or plan.settings[GATE_LIMIT] == math.inf:
+        return False
+    found: bool = receiver.use_noise(state.scalars, work.measurement, innovation)
+    return found
+
+
+@scalar_kernel
+def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) -> int:
+    """Return what becomes of a measurement, whose variances are raised if it weighs less."""
+    kind, scalars = int(work.measurement[KIND]), state.scalars
+    # a receiver that has just been wrong gets no benefit of the doubt
+    if kind == kinds.GNSS_POSITION and scalars[RECEIVER + receiver.DOUBTS] > 0.0:
+        passes = innovation[NIS] <= min(plan.settings[GATE_LIMIT], receiver.WARY_LIMIT)
+    else:
+        passes = innovation[NIS] <= plan.settings[GATE_LIMIT] or _passes_with_caution(plan, work, rows)
+    if kind != kinds.GNSS_POSITION:
+        if passes:
+            return ACCEPTED
+        if not kinds.DEWEIGHTS[kind]:
+            return REJECTED
+        receiver.doubt(work.measurement, innovation, False)
+        return DEWEIGHTED
+    if plan.settings[GATE_LIMIT] == math.inf:
         return ACCEPTED
-    state.scalars[rejections] += 1.0
-    if not kinds.REOPENS[kind] or state.scalars[rejections] <= plan.settings[REOPEN_AFTER]:
-        return REJECTED
-    state.scalars[rejections] = 0.0
-    return REOPENED
+    noisy = innovation[receiver.NOISE] > 1.0
+    of_series = receiver.is_of_series(scalars, innovation)
+    if passes and (noisy or not of_series):
+        scalars[RECEIVER + receiver.SERIES] = 0.0
+        scalars[RECEIVER + receiver.DOUBTS] = max(0.0, scalars[RECEIVER + receiver.DOUBTS] - 1.0)
+        return ACCEPTED
+    scalars[RECEIVER + receiver.DOUBTS] = min(receiver.MOST_DOUBTS, scalars[RECEIVER + receiver.DOUBTS] + 1.0)
+    if not of_series:
+        receiver.begin_series(scalars, innovation)
+    elif receiver.has_lasted(scalars):
+        scalars[RECEIVER + receiver.SERIES] = scalars[RECEIVER + receiver.DOUBTS] = 0.0
+        return RESET
+    receiver.doubt(work.measurement, innovation, of_series)
+    return DEWEIGHTED
 
 
 @scalar_kernel
-def _passes_gate(plan: Plan, work: Work, rows: int, nis: float) -> bool:
-    limit = plan.settings[GATE_LIMIT]
-    if nis <= limit:
-        return True
+def _note(state: State, work: Work, innovation: Array, status: int) -> None:
+    """Note what a position leaves of its innovation."""
+    if int(work.measurement[KIND]) != kinds.GNSS_POSITION:
+        return
+    receiver.note_update(state.scalars, work.measurement, innovation, work.noise)
+    if status == RESET:
+        for a in range(kalman.ROWS):
+            state.scalars[RECEIVER + receiver.AFTER + a] = 0.0
+            state.scalars[RECEIVER + receiver.SPREAD + a] = work.noise[a]
+
+
+@scalar_kernel
+def _passes_with_caution(plan: Plan, work: Work, rows: int) -> bool:
     cautious = 0.0
     for row in range(rows):
         cautious += kalman.cautious_innovation_squared(work.updates[int(work.residuals[row, UPDATE])], CAUTION)
-    passes: bool = cautious <= limit * rows
+    passes: bool = cautious <= plan.settings[GATE_LIMIT] * rows
     return passes
 
 
 @scalar_kernel
-def _reopen_each(state: State, plan: Plan, work: Work, rows: int, nis: float) -> None:
-    """Let the covariances grow until the measurement, of a position, is believable.
-
-    The filter is surer of itself than it should be, in velocity and attitude as much as in position, so P is scaled
-    as a whole; what is left of a jump that no error of this size explains goes to the position alone.
-    """
-    growth, stride = min(nis / 3.0, MOST_GROWTH), int(plan.settings[STRIDE])
+def _reset_each(state: State, plan: Plan, work: Work, rows: int) -> None:
+    """Set the position of every block to what is measured, and how sure it is; nothing else follows from it."""
+    stride = int(plan.settings[STRIDE])
     for row in range(rows):
         s = int(work.residuals[row, OWNER])
-        block, update = state.blocks[s], work.updates[s]
-        covariance.grow(block, growth, stride)
-        kalman.gain(block, update, stride)
-        if kalman.normalized_innovation_squared(update) > plan.settings[GATE_LIMIT]:
-            for a in range(kalman.ROWS):
-                block[P + a * (stride + 1)] += update[kalman.RESIDUAL + a] ** 2
-            kalman.gain(block, update, stride)
+        block, residual = state.blocks[s], work.updates[s, kalman.RESIDUAL : kalman.RESIDUAL + 3]
+        covariance.complete(block, stride)
+        for a in range(kalman.ROWS):
+            if not work.noise[a] > 0.0:
+                continue
+            for j in range(stride):
+                block[P + a * stride + j] = 0.0
+                block[P + j * stride + a] = 0.0
+            block[P + a * (stride + 1)] = work.noise[a]
+        _shift(state, plan, s, residual, work.noise)
+    update_derived(state, plan, work)
 
 
 @scalar_kernel
-def _reopen_joint(state: State, plan: Plan, work: Work, further: Further, nis: float) -> None:
-    """Let the covariance of all blocks grow as `_reopen_each` does that of one; a jump goes to all their positions."""
-    growth, stride, size = min(nis / 3.0, MOST_GROWTH), int(plan.settings[STRIDE]), state.joint.shape[0]
-    for i in range(size):
-        for j in range(size):
-            state.joint[i, j] *= growth
-    _gain_of_row(state, work, further, 0)
-    if kalman.normalized_innovation_squared(work.updates[0]) > plan.settings[GATE_LIMIT]:
+def _reset_joint(state: State, plan: Plan, work: Work, further: Further) -> None:
+    """Set the mean position of joined blocks to what is measured; all are then off by the error that it has."""
+    stride, size = int(plan.settings[STRIDE]), state.joint.shape[0]
+    for a in range(kalman.ROWS):
+        if not work.noise[a] > 0.0:
+            continue
+        for i in range(a, size, stride):
+            for j in range(size):
+                state.joint[i, j] = 0.0
+                state.joint[j, i] = 0.0
+        for i in range(a, size, stride):
+            for j in range(a, size, stride):
+                state.joint[i, j] = work.noise[a] * (1.0 + OWN_SHARE * (i == j))
+    joint.scatter(state.blocks, plan.spans.shape[0], state.joint, stride)
+    for s in range(plan.spans.shape[0]):
+        if state.silent[0, s] < 0.0:
+            _shift(state, plan, s, work.residuals[0, Z : Z + 3], work.noise)
+    update_derived(state, plan, work)
+
+
+@scalar_kernel
+def _shift(state: State, plan: Plan, s: int, residual: Array, noise: Array) -> None:
+    """Move the members of a block by what is measured of it."""
+    for i in range(plan.spans[s, 0], plan.spans[s, 1]):
+        lanes, lane = state.rows[i // LANES], i % LANES
+        for k in range(bank.STATES):
+            lanes[bank.CORRECTION + k * LANES + lane] = 0.0
         for a in range(kalman.ROWS):
-            for i in range(a, size, stride):
-                for j in range(a, size, stride):
-                    state.joint[i, j] += work.residuals[0, Z + a] ** 2
-        _gain_of_row(state, work, further, 0)
+            if noise[a] > 0.0:
+                lanes[bank.CORRECTION + a * LANES + lane] = residual[a]
+    _feed_back(state, plan, s)
 
 
 # --- what it corrects -------------------------------------------------------------------------------------------------
