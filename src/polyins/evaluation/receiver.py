@@ -90,11 +90,11 @@ def _noise(kind: str, measured: Innovations) -> Iterator[Finding]:
 
 def _delay(kind: str, measured: Innovations) -> Iterator[Finding]:
     """Say that positions are late: they then change as the vehicle did before, by the delay times its acceleration."""
-    if measured.change is None or measured.velocity is None:
+    if measured.change is None or measured.gained is None:
         return
     steps = np.diff(measured.time)
     near = np.flatnonzero((steps < LONGEST_BREAK) & measured.accepted[1:]) + 1
-    gained = (measured.velocity[near] - measured.velocity[near - 1])[:, :2].ravel()
+    gained = measured.gained[near, :2].ravel()
     change = measured.change[near, :2].ravel()
     power = float(np.sum(gained**2))
     if near.size < LEAST or power <= 0.0:

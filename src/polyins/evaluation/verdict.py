@@ -61,7 +61,9 @@ def verdict(solution: Solution, figures: Figures) -> Verdict:
 
 def of_measurements(solution: Solution) -> tuple[Finding, ...]:
     """Return what the innovations of a solution say of it."""
-    return tuple(finding for kind, measured in solution.measurements.items() for finding in _of_kind(kind, measured))
+    return tuple(
+        finding for kind, measured in solution.measurements.items() for finding in _of_kind(kind, measured.used())
+    )
 
 
 def _of_epochs(solution: Solution, epochs: Epochs) -> Iterator[Finding]:

@@ -39,16 +39,26 @@ class Innovations:
     """of a position: how the receiver moved since the fix before, otherwise than the IMUs did, m, shape (M, 3)"""
     noise_ratio: Array | None = None
     """of a position: the variance that was found from fix to fix and used, over the stated one, or 1; shape (M,)"""
-    velocity: Array | None = None
-    """of a position: m/s north, east, down, of the state then, shape (M, 3)"""
+    gained: Array | None = None
+    """of a position: what the velocity gained since the fix before by the IMUs alone, m/s, shape (M, 3)"""
     axes: tuple[str, ...] = ("north", "east", "down")
     unit: str = "m"
+
+    def used(self) -> Innovations:
+        """Return those that the filter could compare: while every IMU is silent it predicts nothing."""
+        rows = self.std.max(axis=1) > 0.0
+        if rows.all():
+            return self
+        names = ["time", "residual", "std", "nis", "accepted", "reset", "velocity_rejected", "rows"]
+        names += [name for name in ("change", "noise_ratio", "gained") if getattr(self, name) is not None]
+        kept: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
+        return replace(self, **kept)
 
     @classmethod
     def joined(cls, parts: Sequence[Innovations]) -> Innovations:
         """Return those of parts of a recording that follow one another."""
         names = ["time", "residual", "std", "nis", "accepted", "reset", "velocity_rejected", "rows"]
-        names += [name for name in ("change", "noise_ratio", "velocity") if getattr(parts[0], name) is not None]
+        names += [name for name in ("change", "noise_ratio", "gained") if getattr(parts[0], name) is not None]
         whole: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return replace(parts[0], **whole)
 

@@ -358,7 +358,7 @@ def innovations_of(run: Prepared) -> dict[str, Innovations]:
             velocity_rejected=np.isin(queue.time[shown], lost) if of_fix else np.zeros(len(shown), dtype=bool),
             change=rows[:, receiver.D : receiver.D + axes] if of_fix else None,
             noise_ratio=rows[:, receiver.NOISE] if of_fix else None,
-            velocity=_velocity_at(run, queue.time[shown]) if of_fix else None,
+            gained=_gained(run, queue.time[shown]) if of_fix else None,
             rows=(queue.variance[shown] > 0.0).sum(axis=1),
             axes=kind.axes,
             unit=kind.unit,
@@ -366,8 +366,13 @@ def innovations_of(run: Prepared) -> dict[str, Innovations]:
     return found
 
 
-def _velocity_at(run: Prepared, time: Array) -> Array:
-    return run.outputs.states[np.clip(np.searchsorted(run.inputs.time, time), 1, len(run.inputs.time) - 1), 3:6]
+def _gained(run: Prepared, time: Array) -> Array:
+    """Return what the velocity gained from fix to fix, up to the epoch before each: none of it is from the fixes."""
+    at = np.clip(np.searchsorted(run.inputs.time, time), 1, len(run.inputs.time) - 1)
+    velocity = run.outputs.states[:, 3:6]
+    gained = np.zeros((len(time), 3))
+    gained[1:] = velocity[np.maximum(at[1:] - 1, at[:-1])] - velocity[at[:-1]]
+    return gained
 
 
 def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, OffsetEstimate]:

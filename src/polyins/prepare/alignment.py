@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,23 +11,24 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.errors import InputError
 from polyins.kernels import earth
 from polyins.model.attitude import euler_angles, in_succession, of_rotation_vectors, quaternions, rotation_matrices
-from polyins.model.geodesy import metres_per_unit
+from polyins.model.geodesy import displacement, metres_per_unit
 from polyins.model.recording import GnssStream, Recording, StartOptions
 from polyins.model.rig import DEG, Rig
 from polyins.prepare.timesync import Aligned
+from polyins.prepare.under_way import AROUND, HARDEST, Motion, find_motion
 
 Array = NDArray[np.float64]
 
 WINDOW = 1.0  # s
+UNDER_WAY = "first fix in motion"
+"""where the time of a start comes from"""
 STILL_RATE = 0.4 * DEG  # rad/s, of the averaged gyro within a window
 STILL_FORCE = 0.10  # m/s^2
 SHORTEST_STANDSTILL = 3.0  # s
+SLOW = 1.0  # m/s: what drifts that fast has to be told from rest
 LONGEST_STANDSTILL = 60.0  # s
 FARTHEST_START = 10e3  # m from GNSS: farther away it is another place
 LEAST_LEFT = 1.0  # s, of data after the start
-COURSE_SPEED = 1.5  # m/s: slower than this the direction of motion is no heading
-AROUND = 5  # fixes: their median outvotes one that lies, and the two differences in which it shows
-HARDEST = 5.0  # m/s^2: what a vehicle accelerates by at most, for seconds
 
 
 @dataclass(frozen=True)
@@ -145,11 +147,8 @@ class _Search:
         self.errors = np.array([imu.initial_errors.as_array() for imu in recording.rig.imus])
         self.error_std = np.array([imu.start_std() for imu in recording.rig.imus])
         self.fixes = velocities_from_positions(recording.gnss, recording.geodetic) if recording.gnss else None
-        # differences at the first two fixes are one-sided, in velocity or in the acceleration that follows from it
-        given = recording.gnss is not None and recording.gnss.velocity is not None
-        self.first_moving = 0 if given else 2
-        # a fix that lies shows in two differences: a median over five has neither
-        self.usual = None if self.fixes is None else usual_velocity(self.fixes)
+        self.motions: dict[float, Motion | None] = {}
+        """under way from a time on"""
 
     def run(self) -> Start:
         still = self._standstill()
@@ -190,10 +189,21 @@ class _Search:
         nothing_left = self.options.roll_pitch is not None and not self.options.estimate_gyro_bias
         if nothing_left or self.options.heading_from == "reference":
             return None
-        found = find_standstill(self.aligned, self.fixes)
+        bias_std = float(self.error_std[:, 3:6].mean()) / np.sqrt(len(self.error_std))
+        found = find_standstill(self.aligned, self.fixes, self.recording.geodetic, 4.0 * bias_std)
+        if found and self._moves_before(found[0]):
+            return None
         if found:
             self.sources["standstill"] = f"found: {found[0]:.3f} to {found[1]:.3f} s"
         return found
+
+    def _moves_before(self, time: float) -> bool:
+        """Whether the array is under way, with a heading, before it stands still."""
+        first = float(self.aligned.time[0])
+        if time - first < WINDOW or self.fixes is None or self.options.time is not None:
+            return False
+        motion = self._motion(first, None)
+        return motion is not None and motion.time < time
 
     def _time(self, still: tuple[float, float] | None) -> float:
         first, last = self.aligned.time[0], self.aligned.time[-1]
@@ -204,7 +214,7 @@ class _Search:
             if self.recording.gnss is not None and self.options.position is None:
                 wanted = max(wanted, float(self.recording.gnss.time[0]))
         elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
-            wanted, self.sources["time"] = self._moving(first), "first fix in motion"
+            wanted, self.sources["time"] = self._under_way(float(first), None).time, UNDER_WAY
         elif self.fixes is not None and self.options.position is None:
             # between two fixes the position would be off by what the array accelerates there
             later = self.fixes.time[self.fixes.time >= first]
@@ -218,20 +228,58 @@ class _Search:
             )
         return float(self.aligned.time[np.searchsorted(self.aligned.time, wanted)])
 
-    def _moving(self, after: float) -> float:
-        """Return the time of the first fix after `after` whose speed makes its course a heading."""
-        assert self.fixes is not None
-        assert self.fixes.velocity is not None
-        assert self.usual is not None
-        speed = np.hypot(self.usual[:, 0], self.usual[:, 1])
-        believable = np.linalg.norm(self.fixes.velocity - self.usual, axis=1) < 0.5 + 0.3 * speed
-        moving = np.flatnonzero((speed > COURSE_SPEED) & believable & (self.fixes.time >= after))
-        moving = moving[moving >= self.first_moving]
-        if len(moving) == 0:
+    def _under_way(self, after: float, still: tuple[float, float] | None) -> Motion:
+        motion = self._motion(after, still)
+        if motion is None:
             raise InputError(
-                f"start: no heading: GNSS never moves faster than {COURSE_SPEED} m/s; expected start.heading_deg"
+                "start: no heading: GNSS does not tell one, since nothing moves far enough against the noise of its"
+                " fixes; expected start.heading_deg"
             )
-        return float(self.fixes.time[moving[0]])
+        return motion
+
+    def _motion(self, after: float, still: tuple[float, float] | None) -> Motion | None:
+        """Return the first motion from a time on, with the gyros' biases of a standstill if there was one."""
+        if after not in self.motions:
+            assert self.recording.gnss is not None
+            bodies = self._bodies()
+            last = self.aligned.time[-1]
+            shown = self.recording.gnss.time[(self.recording.gnss.time >= after) & (self.recording.gnss.time <= last)]
+            std = float(self.error_std[bodies, :3].mean()) / np.sqrt(len(bodies)) if bodies else 0.0
+            if len(shown) > 1:
+                gnss = without_rows_after(self.recording.gnss, float(last))
+                turned = self._turning(after, shown, still)
+                bias_std = 0.1 * std if still else std
+                found = find_motion(gnss, self.recording.geodetic, turned, bias_std, after)
+                self.motions[after] = found
+            else:
+                self.motions[after] = None
+        return self.motions[after]
+
+    def _bodies(self) -> list[int]:
+        """Return the IMUs that turn with the vehicle: one on a wheel does not."""
+        return [i for i, imu in enumerate(self.recording.rig.imus) if imu.wheel is None]
+
+    def _turning(self, begin: float, times: Array, still: tuple[float, float] | None) -> Callable[[Array], Array]:
+        """Return what tells how far the heading has turned since a time, from the gyros alone."""
+        bodies = self._bodies()
+        if not bodies:
+            raise InputError("start: no heading: every IMU is on a wheel; expected start.heading_deg")
+        bias = self._mean(*still)[0][bodies].mean(axis=0) if still else np.zeros(3)
+        known = bias + self.errors[bodies, :3].mean(axis=0)
+        part = self.aligned.between(begin, float(times[-1]) + 1.0)
+        steps = part.increments[1:, :3][:, :, bodies].mean(axis=2) - known * np.diff(part.time)[:, None]
+        force = part.increments[: max(2, round(WINDOW * self.aligned.rate_hz)), 3:].sum(axis=(0, 2))
+        attitude = quaternions(np.array([[*level(force), 0.0]]))[0]
+        headings, before = [0.0], 0
+        marks = np.searchsorted(part.time[1:], times, "right")
+        for mark in marks:
+            if mark > before:
+                rotations = np.concatenate([attitude[None, :], of_rotation_vectors(steps[before:mark])])
+                attitude = in_succession(rotations)
+                before = mark
+            headings.append(float(euler_angles(attitude[None, :])[0, 2]))
+        yaw = np.unwrap(headings)[1:]
+        return lambda wanted: np.interp(wanted, times, yaw)
 
     def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
         reference = self.recording.reference
@@ -248,6 +296,10 @@ class _Search:
             else:
                 velocity = _interpolate(time, reference.time, reference.velocity)
             return velocity, np.full(3, 0.3)
+        motion = self.motions.get(float(self.aligned.time[0]))
+        if motion is not None and abs(motion.time - time) < WINDOW and self.sources["time"] == UNDER_WAY:
+            self.sources["velocity"] = "GNSS, fixes under way"
+            return motion.velocity + motion.acceleration * (time - motion.time), motion.velocity_std
         if self.fixes is not None and self.fixes.velocity is not None:
             self.sources["velocity"] = "GNSS"
             return self._velocity_from_fixes(time)
@@ -280,6 +332,12 @@ class _Search:
             bias_std = self.error_std[:, 3:6].mean() / 9.8
             return level(force.mean(axis=0)), float(max(0.1 * DEG, bias_std))
         self.sources["roll_pitch"] = "levelled in motion, acceleration from GNSS"
+        motion = self.motions.get(float(self.aligned.time[0]))
+        if motion is not None and abs(motion.time - time) < WINDOW:
+            _, force, _ = self._mean(max(time - 0.5, self.aligned.time[0]), time + 0.5)
+            bias_std = self.error_std[:, 3:6].mean()
+            tilt_std = float(np.hypot(motion.acceleration_std, bias_std)) / 9.8 + 1.0 * DEG
+            return level(force.mean(axis=0), motion.acceleration, motion.heading), tilt_std
         _, force, _ = self._mean(time - 0.5, time + 0.5)
         heading = float(np.arctan2(velocity[1], velocity[0]))
         return level(force.mean(axis=0), self._acceleration(time), heading), 3.0 * DEG
@@ -307,30 +365,17 @@ class _Search:
             return float(_interpolate(time, reference.time, unwrapped)[0]), 2.0 * DEG
         if self.fixes is None:
             raise InputError("start: heading_from is gnss-course, but there is no GNSS")
-        assert self.fixes.velocity is not None
-        at = self._moving(time)
-        course = _interpolate(at, self.fixes.time, self.fixes.velocity)
-        turned = self._turned(time, at, still, roll_pitch)
-        self.sources["heading"] = f"GNSS course at {at:.3f} s, less {turned / DEG:.1f} deg turned since the start"
-        return float(np.arctan2(course[1], course[0]) - turned), 5.0 * DEG
-
-    def _turned(
-        self, begin: float, end: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float]
-    ) -> float:
-        """Return how far the heading turns from begin to end, from the gyros alone."""
-        if end <= begin:
-            return 0.0
-        # an IMU on a wheel turns with it
-        bodies = [i for i, imu in enumerate(self.recording.rig.imus) if imu.wheel is None]
-        if not bodies:
-            raise InputError("start: no heading: every IMU is on a wheel; expected start.heading_deg")
-        bias = self._mean(*still)[0][bodies].mean(axis=0) if still else np.zeros(3)
-        part = self.aligned.between(begin, end)
-        known = bias + self.errors[bodies, :3].mean(axis=0)
-        steps = part.increments[1:, :3][:, :, bodies].mean(axis=2) - known * np.diff(part.time)[:, None]
-        before = quaternions(np.array([[*roll_pitch, 0.0]]))
-        after = in_succession(np.concatenate([before, of_rotation_vectors(steps)]))
-        return float(euler_angles(after[None, :])[0, 2])
+        first = float(self.aligned.time[0])
+        under_way = not still and self.sources["time"] == UNDER_WAY
+        motion = self._under_way(first if under_way else time, still)
+        turning = self._turning(min(time, motion.time), np.array([min(time, motion.time), motion.time]), still)
+        turned = float(np.diff(turning(np.array([min(time, motion.time), motion.time])))[0])
+        drift = float(self.error_std[:, :3].mean()) * (0.1 if still else 1.0) * (motion.time - min(time, motion.time))
+        self.sources["heading"] = (
+            f"GNSS course from {motion.time:.3f} to {motion.until:.3f} s,"
+            f" less {turned / DEG:.1f} deg turned since the start"
+        )
+        return motion.heading - turned, float(np.hypot(motion.heading_std, drift))
 
     def _position(self, time: float, attitude: Array) -> tuple[Array, Array]:
         if self.options.position is not None:
@@ -422,6 +467,10 @@ class _RollingSearch(_Search):
 
     imu_attitudes: Array
 
+    def _moves_before(self, time: float) -> bool:
+        # it starts at a standstill in any case
+        return False
+
     def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
         standing = still is not None and still[0] <= time <= still[1] + 0.5
         if self.options.velocity is None and not standing:
@@ -494,11 +543,14 @@ def usual_velocity(fixes: GnssStream) -> Array:
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1))
 
 
-def find_standstill(aligned: Aligned, fixes: GnssStream | None) -> tuple[float, float] | None:
+def find_standstill(
+    aligned: Aligned, fixes: GnssStream | None, geodetic: bool = True, bias: float = np.inf
+) -> tuple[float, float] | None:
     """Return the first interval of at least three seconds, at most sixty, in which the array stands still.
 
     Judged second by second: rates and forces averaged over tenths of a second hardly vary, and the usual speed that
-    GNSS gives, where it gives one, is that of its noise.
+    GNSS gives, where it gives one, is that of its noise. Over the whole interval the mean force is gravity but for
+    `bias`, m/s^2, and the fixes keep to their place but for their noise: steady acceleration or motion is none.
     """
     window = max(2, round(WINDOW * aligned.rate_hz))
     tenth = max(1, round(0.1 * aligned.rate_hz))
@@ -519,9 +571,52 @@ def find_standstill(aligned: Aligned, fixes: GnssStream | None) -> tuple[float, 
             still[(edges[:-1] - 1.0 < t) & (t < edges[1:] + 1.0)] = False
     runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     for begin, end in zip(runs[::2], runs[1::2], strict=True):
-        if edges[end] - edges[begin] >= SHORTEST_STANDSTILL:
-            return float(edges[begin]), float(min(edges[end], edges[begin] + LONGEST_STANDSTILL))
+        until = float(min(edges[end], edges[begin] + LONGEST_STANDSTILL))
+        if until - edges[begin] < SHORTEST_STANDSTILL:
+            continue
+        if feels_gravity(aligned, float(edges[begin]), until, bias) and keeps_place(
+            fixes, geodetic, float(edges[begin]), until
+        ):
+            return float(edges[begin]), until
     return None
+
+
+def feels_gravity(aligned: Aligned, begin: float, end: float, bias: float) -> bool:
+    """Whether the mean specific force of an interval is as large as gravity, but for `bias` and 0.15 m/s^2."""
+    part = aligned.between(begin, end)
+    # of each by itself: on a wheel it points elsewhere
+    forces = np.linalg.norm(part.increments[1:, 3:].sum(axis=0), axis=0) / (part.time[-1] - part.time[0])
+    return bool(abs(float(np.median(forces)) - 9.81) <= 0.15 + bias)
+
+
+def keeps_place(fixes: GnssStream | None, geodetic: bool, begin: float, end: float) -> bool:
+    """Whether fixes of an interval do not drift beyond their noise, which tells a slow drive from rest."""
+    if fixes is None:
+        return True
+    inside = np.flatnonzero((fixes.time >= begin) & (fixes.time <= end))
+    if len(inside) < 3:
+        return True
+    if fixes.velocity is not None and fixes.velocity_std is not None:
+        mean = np.linalg.norm(fixes.velocity[inside].mean(axis=0)[:2])
+        if mean > 4.0 * float(np.median(fixes.velocity_std[inside, :2])) / np.sqrt(len(inside)) + 0.1:
+            return False
+    time = fixes.time[inside] - fixes.time[inside].mean()
+    place = displacement(fixes.position[inside], fixes.position[inside[0]], geodetic)[:, :2]
+    drift = np.hypot(*np.polyfit(time, place, 1)[0])
+    std = float(np.median(fixes.position_std[inside, :2])) / np.sqrt(float(np.sum(time**2)))
+    return bool(drift <= 4.0 * std + 0.1 <= SLOW)
+
+
+def without_rows_after(gnss: GnssStream, time: float) -> GnssStream:
+    """Return the fixes up to a time, s."""
+    kept = gnss.time <= time
+
+    def of(values: Array | None) -> Array | None:
+        return None if values is None else values[kept]
+
+    return GnssStream(
+        gnss.time[kept], gnss.position[kept], gnss.position_std[kept], of(gnss.velocity), of(gnss.velocity_std)
+    )
 
 
 def level(force: Array, acceleration: Array | None = None, heading: float = 0.0) -> tuple[float, float]:
