@@ -419,7 +419,8 @@ def test_the_position_is_that_of_the_antenna_less_its_lever_arm() -> None:
     metres = metres_per_unit(PLACE, True)
     assert np.abs((start.position - PLACE) * metres).max() < 0.02
     assert start.sources["position"] == "GNSS"
-    np.testing.assert_array_equal(start.position_std, 0.02)
+    # of the fix, and of where the antenna is seen from the origin
+    assert ((start.position_std > 0.02) & (start.position_std < 0.05)).all()
 
 
 def lying_at(which: list[int], recording: Recording, metres_north: float = 50.0) -> Recording:
@@ -464,7 +465,8 @@ def test_fixes_that_tell_the_truth_are_taken_as_they_are() -> None:
         start = found(replace(recording, gnss=gnss, start=StartOptions(time=time, heading=1.5)))
         assert start.sources["position"] == "GNSS"
         assert start.sources["velocity"] == "GNSS"
-        np.testing.assert_array_equal(start.position_std, 0.02)
+        # of the fix, and of where the antenna is seen from the origin
+    assert ((start.position_std > 0.02) & (start.position_std < 0.05)).all()
 
 
 def test_a_start_waits_for_the_first_fix_within_the_imus() -> None:

@@ -25,6 +25,8 @@ DIGITS = 1e-6
 """of the largest value: less is how it was written"""
 LEAST_CLIPPED = 5
 """samples in a row at exactly the largest value"""
+LEAST_SAMPLES = 50
+"""that two sensors do not share by chance"""
 LEAST_STEPS = 10.0
 """usual steps from zero to the largest value; less is coarse resolution"""
 NAMES = ("gyro x", "gyro y", "gyro z", "accelerometer x", "accelerometer y", "accelerometer z")
@@ -82,6 +84,19 @@ def check_alive(streams: Sequence[ImuStream]) -> None:
     dead = int(np.argmin(spread))
     if spread[dead] == 0.0 < max(spread):
         raise InputError(f"IMU {streams[dead].name}: shows the same values throughout; expected one that measures")
+
+
+def check_distinct(streams: Sequence[ImuStream]) -> None:
+    """Raise InputError if two IMUs show the same samples throughout, which two sensors never do."""
+    for i, one in enumerate(streams):
+        for other in streams[i + 1 :]:
+            same = len(one.time) == len(other.time) and len(one.time) >= LEAST_SAMPLES
+            if same and np.array_equal(one.dtheta, other.dtheta) and np.array_equal(one.dvel, other.dvel):
+                distinct = one.dtheta[np.diff(one.dtheta[:, 0], prepend=np.nan) != 0.0]
+                if _is_rough(distinct, 1, 0.0):
+                    raise InputError(
+                        f"IMU {one.name} and IMU {other.name}: their samples are identical; expected two sensors"
+                    )
 
 
 def _rates(rows: ImuRows) -> Array:

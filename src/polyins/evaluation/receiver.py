@@ -19,8 +19,8 @@ MUCH_NOISE = 100.0
 NOISY_SHARE = 0.02
 LONGEST_BREAK = 5.0
 """s between two fixes of one jump, or two changes of the velocity that tell a delay"""
-LEAST_DELAY = 0.03
-"""s"""
+LEAST_DELAY, MOST_DELAY = 0.03, 3.0
+"""s: beyond, the changes are those of something else"""
 SURE = 5.0
 """standard deviations by which a delay is not zero"""
 EXPLAINED = 0.04
@@ -103,7 +103,7 @@ def _delay(kind: str, measured: Innovations) -> Iterator[Finding]:
     left = float(np.mean((change - delay * gained) ** 2))
     std = float(np.sqrt(left / power))
     explained = 1.0 - left / max(float(np.mean(change**2)), 1e-30)
-    if abs(delay) < max(LEAST_DELAY, SURE * std) or explained < EXPLAINED:
+    if not max(LEAST_DELAY, SURE * std) <= abs(delay) <= MOST_DELAY or explained < EXPLAINED:
         return
     late = "late" if delay > 0.0 else "early"
     yield Finding(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.model.recording import Array, usual_interval
+from polyins.prepare.timesync import GAP
 
 
 @dataclass(frozen=True)
@@ -93,11 +94,17 @@ def without(rows: ImuRows, bad: NDArray[np.bool_]) -> ImuRows:
     holes = np.diff(kept, prepend=kept[:1] - 1) - 1
     bridged = (holes > 0) & (holes <= LONGEST_BRIDGE) & (np.arange(len(kept)) > 0)
     own, time = intervals(rows.time)[kept], rows.time[kept]
-    factor = np.where(bridged, intervals(time) / own, 1.0)[:, None]
+    factor = np.where(bridged, np.diff(time, prepend=time[:1]) / own, 1.0)[:, None]
     return replace(rows, time=time, dtheta=rows.dtheta[kept] * factor, dvel=rows.dvel[kept] * factor)
 
 
 def intervals(time: Array) -> Array:
-    """Return the length of the interval that ends at each stamp, s; the first is taken to be the usual one."""
+    """Return the length of the interval that ends at each stamp, s.
+
+    The first is taken to be the usual one, and so is that after a gap: what a rate was in it is not known.
+    """
     steps = np.diff(time)
-    return np.concatenate([[usual_interval(time)], steps]) if len(steps) else np.zeros(len(time))
+    if not len(steps):
+        return np.zeros(len(time))
+    usual = usual_interval(time)
+    return np.concatenate([[usual], np.where(steps > GAP * usual, usual, steps)])

@@ -234,6 +234,10 @@ class Recording:
     aiding: tuple[AidingStream, ...] = ()
     """what sensors beside IMUs and GNSS say"""
 
+    def without_gate(self) -> Recording:
+        """Return the recording with every measurement taken as it is, as the papers do."""
+        return replace(self, options=replace(self.options, gate_limit=None))
+
     def subset(self, indices: Iterable[int]) -> Recording:
         """Return the recording with just the IMUs of those indices."""
         kept = tuple(indices)

@@ -19,7 +19,7 @@ from polyins.model.recording import Recording
 from polyins.model.solution import Innovations, OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.model.status import patience, status_of
-from polyins.navigate import engine, events, layout, receiver, update
+from polyins.navigate import engine, events, layout, receiver, restart, update
 from polyins.navigate import start as search
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
@@ -109,9 +109,12 @@ def run(
 ) -> Solution:
     """Navigate a recording with one method and return its solution.
 
-    `imu` is the index of the IMU that `single` uses. `progress` is called with the share of epochs done. Raises
-    InputError for a method that is unknown or data that give no start.
+    After a pause in which no IMU of an array has data the state is found anew, see `restart`. `imu` is the index of
+    the IMU that `single` uses. `progress` is called with the share of epochs done. Raises InputError for a method that
+    is unknown or data that give no start.
     """
+    if restart.pauses(recording):
+        return restart.run_parts(recording, lambda part: navigate(prepare(part, method, imu=imu), progress))
     return navigate(prepare(recording, method, imu=imu), progress)
 
 

@@ -158,6 +158,13 @@ class _Search:
         heading, heading_std = self._heading(time, still, roll_pitch, velocity)
         attitude = np.array([roll_pitch[0], roll_pitch[1], heading])
         position, position_std = self._position(time, attitude)
+        if self.sources["position"].startswith("GNSS"):
+            # the array's origin is only as sure as where the antenna is seen from it
+            lever = self.recording.rig.antenna
+            around = np.array([heading_std, heading_std, 0.0]) * np.hypot(lever[0], lever[1])
+            tilted = np.array([tilt_std, tilt_std, 0.0]) * abs(lever[2])
+            over = np.array([0.0, 0.0, tilt_std]) * np.hypot(lever[0], lever[1])
+            position_std = np.sqrt(position_std**2 + around**2 + tilted**2 + over**2)
         if still and self.options.estimate_gyro_bias:
             self._gyro_biases(still, attitude, position)
         else:

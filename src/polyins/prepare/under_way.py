@@ -38,6 +38,8 @@ FITTED = 10.0
 """s of fixes to which speed and acceleration are fitted"""
 AT_ONCE = 1.0
 """s of fixes that tell how it turns, and where they have velocities accelerates, at the start"""
+UNSTEADY_SPEED_STD = 0.3
+"""m/s, by which a parabola misses the speed"""
 UNSTEADY_STD = 0.3
 """m/s^2, by which the acceleration changes in that time"""
 AROUND = 5
@@ -157,8 +159,7 @@ class _Way:
         """Return the motion at the first of some fixes, whose last one is given."""
         along = np.exp(1j * np.angle(self.sum[last] - self.sum[first]))
         heading = float(np.angle(along * np.exp(1j * self.yaw[first])))
-        end = max(first + 2, int(np.searchsorted(self.time, self.time[first] + FITTED, "right")))
-        part = slice(first, min(end, len(self.time)))
+        part = self._fitted(first, along)
         after = self.time[part] - self.time[first]
         distance = np.real((self.sum[part] - self.sum[first]) / along)
         speed, gain, speed_std, gain_std = _speed(after, distance, float(np.median(self.std[part])))
@@ -169,6 +170,8 @@ class _Way:
         aside = np.array([-np.sin(heading), np.cos(heading), 0.0])
         if self.given:
             return self._given(first, soon, heading, std, last)
+        # a parabola is not how a vehicle moves for long
+        speed_std = float(np.hypot(speed_std, UNSTEADY_SPEED_STD))
         across = max(speed_std, abs(speed) * std)
         return Motion(
             time=float(self.time[first]),
@@ -180,6 +183,21 @@ class _Way:
             acceleration_std=gain_std,
             until=float(self.time[last]),
         )
+
+    def _fitted(self, first: int, along: complex) -> slice:
+        """Return the fixes that a parabola describes: fewer than ten seconds where their noise is small."""
+        duration = FITTED
+        while True:
+            end = max(first + 3, int(np.searchsorted(self.time, self.time[first] + duration, "right")))
+            part = slice(first, min(end, len(self.time)))
+            after = self.time[part] - self.time[first]
+            distance = np.real((self.sum[part] - self.sum[first]) / along)
+            if len(after) <= 4:
+                return part
+            left = distance - np.polyval(np.polyfit(after, distance, 2), after)
+            if np.sqrt(np.mean(left**2)) <= 2.0 * float(np.median(self.std[part])):
+                return part
+            duration *= 0.7
 
     def _given(self, first: int, soon: slice, heading: float, std: float, last: int) -> Motion:
         """Return the motion where the receiver gives velocities: they tell the acceleration as well."""

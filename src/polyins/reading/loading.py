@@ -102,6 +102,7 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     imus, streams, warnings = zip(*mounted, strict=True)
     notes += _one_by_kind([text for texts in warnings for text in texts])
     faults.check_alive(streams)
+    faults.check_distinct(streams)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
     notes += [clocks.described(offset) for offset in offsets]
     span = stream_checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})

@@ -1,0 +1,66 @@
+"""A recording that pauses: what follows begins anew, with the IMUs' errors as they were known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from polyins.evaluation.errors import compare_to_reference
+from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.recording import GnssStream, ImuStream, Recording
+from polyins.navigate import batch, restart
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Board, Scenario
+
+
+@pytest.fixture(scope="module")
+def drive() -> Recording:
+    return simulate(Scenario(duration_s=300.0, static_s=20.0, rate_hz=50.0, imus=Board(count=3), outages=(), seed=4))
+
+
+def paused(recording: Recording, begin: float, end: float, imus: tuple[int, ...] = (0, 1, 2)) -> Recording:
+    streams = list(recording.imus)
+    for i in imus:
+        stream = streams[i]
+        kept = (stream.time <= begin) | (stream.time >= end)
+        streams[i] = ImuStream(stream.name, stream.time[kept], stream.dtheta[kept], stream.dvel[kept])
+    return replace(recording, imus=tuple(streams))
+
+
+@pytest.mark.parametrize("length", [12.0, 45.0, 120.0])
+@pytest.mark.parametrize("method", ["single", "enav-fusion"])
+def test_after_a_pause_the_errors_are_within_their_std(drive: Recording, length: float, method: str) -> None:
+    recording = paused(drive, 100.0, 100.0 + length)
+    solution = batch.run(recording, method)
+    (finding,) = [one for one in solution.findings if one.kind == "restart"]
+    assert finding.from_s == pytest.approx(100.0, abs=0.1)
+    assert finding.size == pytest.approx(length, abs=0.1)
+    errors = compare_to_reference(solution, recording.reference)
+    assert solution.time[-1] > 299.0
+    assert solution.time[np.searchsorted(solution.time, 100.5)] < 100.0 + length + 5.0
+    std = np.sqrt(euler_variance(euler_angles(solution.attitude), solution.phi_covariance))[errors.covered]
+    late = errors.time > 100.0 + length
+    assert (np.abs(errors.attitude[late]) < 4.0 * std[late] + np.radians(0.05)).mean() > 0.98
+    position_std = np.sqrt(solution.position_variance)[errors.covered]
+    assert (np.abs(errors.position[late]) < 4.0 * position_std[late] + 0.02).mean() > 0.97
+    assert errors.horizontal[errors.time > 100.0 + length + 40.0].max() < 0.5
+
+
+def test_what_gives_no_start_is_left_out_and_named(drive: Recording) -> None:
+    assert drive.gnss is not None
+    kept = drive.gnss.time < 100.0
+    gnss = GnssStream(drive.gnss.time[kept], drive.gnss.position[kept], drive.gnss.position_std[kept])
+    solution = batch.run(replace(paused(drive, 100.0, 150.0), gnss=gnss), "enav-fusion")
+    assert solution.time[-1] <= 100.0
+    (finding,) = [one for one in solution.findings if one.kind == "pause"]
+    assert "what follows is left out" in finding.text
+
+
+def test_a_pause_of_some_or_a_short_one_is_none(drive: Recording) -> None:
+    assert restart.pauses(drive) == []
+    assert restart.pauses(paused(drive, 100.0, 150.0, (0, 1))) == []
+    assert restart.pauses(paused(drive, 100.0, 105.0)) == []
+    (one,) = restart.pauses(paused(drive, 100.0, 150.0))
+    np.testing.assert_allclose(one, (100.0, 150.0), atol=0.03)
