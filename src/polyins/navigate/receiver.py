@@ -1,8 +1,9 @@
 """How far a receiver of positions is believed: its noise from fix to fix, and steps that it makes.
 
-From one fix to the next the IMUs know the way far better than the receiver. So the change of the innovation,
-d = z before an update - z after the one before, is the receiver's own: its variance is twice that of a fix. Where it
-is more than the receiver states, the noise that was found is used. A fix that neither the stated noise nor an error of
+From one fix to the next the IMUs know the way far better than the receiver, but for an error that goes on. The change
+of the innovation, d = z before an update - z after the one before, is their steady error and the receiver's noise; the
+difference of two changes is the noise alone, of three fixes, and its variance six times that of one. Where it is more
+than the receiver states, the noise that was found is used. A fix that neither the stated noise nor an error of
 the prediction explains begins a series; while the innovation stays what it was the fixes of the series agree with each
 other and not with the past, and weigh next to nothing. If the series lasts, the receiver is right: the position, and
 nothing else, is set to it.
@@ -16,11 +17,14 @@ from polyins.navigate.state import RECEIVER, TIME
 
 RING = 11
 """changes of which the median is taken"""
-LEAST_KNOWN = 5
-MEDIAN_OF_SQUARES = 0.4549 * 2.0
-"""median of d^2 over the variance of a fix, for normal noise"""
+LEAST_KNOWN, LEAST_IN_DOUBT = 5, 2
+"""of them"""
+MEDIAN_OF_SQUARES = 0.4549 * 6.0
+"""median of the squared difference of two changes over the variance of a fix, for normal noise"""
 TOO_SURE = 16.0
 """times the stated variance, from which the one that was found is used"""
+LEAST_VARIANCE = 0.02**2
+"""m^2: below, the IMUs are no better"""
 LONGEST = 5.0
 """s between two fixes from which noise is told"""
 SAME = 0.5
@@ -28,11 +32,15 @@ SAME = 0.5
 SMALL, SMALL_LASTS, LASTS = 20.0, 10.0, 15.5
 """A series of offsets up to that many metres is believed after so many s, one of larger ones after so many."""
 
-CHANGES, COUNT, AFTER, SPREAD, KNOWN, LAST, SERIES, SINCE, OFFSET, DOUBTS = 0, 33, 34, 37, 40, 41, 42, 43, 44, 47
-"""places in the receiver's part of the scalars: squares of changes, how many were noted; the innovation, and its
+CHANGES, COUNT, AFTER, SPREAD, KNOWN, LAST = 0, 33, 34, 37, 40, 41
+SERIES, SINCE, OFFSET, DOUBTS, BEFORE, CHANGED, FIRST, SPEED_VARIANCE = 42, 43, 44, 47, 48, 51, 52, 53
+"""places in the receiver's part of the scalars: differences of changes, how many were noted; the innovation, and its
 variance by the prediction, after the last update; whether there was one, and when; whether a series lasts, since when,
-and what began it; how many fixes have to be good until one that is wrong is an exception again"""
+and what began it; how many fixes have to be good until one that is wrong is an exception again; the last change, and
+whether there was one; when the first of the latest doubts was; the variance that a reset gives the velocity, or 0"""
 
+LOCKED_OUT = 30.0
+"""s of doubts without a fix that is believed, after which it is the prediction that is wrong"""
 MOST_DOUBTS = 10.0
 WARY_LIMIT = 25.0
 """of the normalized innovation squared, five sigma, while there are doubts"""
@@ -46,24 +54,23 @@ def use_noise(scalars: Array, measurement: Array, innovation: Array) -> bool:
     """Note the change since the last fix; raise the variances of a measurement to what is found of them."""
     now, found = scalars[TIME], False
     near = scalars[RECEIVER + KNOWN] != 0.0 and now - scalars[RECEIVER + LAST] <= LONGEST
+    both = near and scalars[RECEIVER + CHANGED] != 0.0
     row = int(scalars[RECEIVER + COUNT]) % RING
-    scalars[RECEIVER + COUNT] += near
+    for a in range(3):
+        change = innovation[a] - scalars[RECEIVER + AFTER + a] if near else 0.0
+        scalars[RECEIVER + CHANGES + 3 * row + a] = change - scalars[RECEIVER + BEFORE + a]
+        scalars[RECEIVER + BEFORE + a] = innovation[D + a] = change
+    scalars[RECEIVER + CHANGED] = near
+    scalars[RECEIVER + COUNT] += both
     innovation[NOISE] = 1.0
     count = int(min(scalars[RECEIVER + COUNT], float(RING)))
-    for a in range(3):
-        variance = measurement[VARIANCE + a]
-        if near and variance > 0.0:
-            change = innovation[a] - scalars[RECEIVER + AFTER + a]
-            growth = max(0.0, innovation[3 + a] - variance - scalars[RECEIVER + SPREAD + a])
-            scalars[RECEIVER + CHANGES + 3 * row + a] = max(0.0, change * change - growth)
-            innovation[D + a] = change
-    if count < LEAST_KNOWN:
+    if count < (LEAST_IN_DOUBT if scalars[RECEIVER + DOUBTS] > 0.0 else LEAST_KNOWN):
         return False
     level = 0.5 * (_median(scalars, 0, count) + _median(scalars, 1, count)) / MEDIAN_OF_SQUARES
     for a in range(3):
         variance = measurement[VARIANCE + a]
         own = level if a < 2 else _median(scalars, 2, count) / MEDIAN_OF_SQUARES
-        if variance > 0.0 and own > TOO_SURE * variance:
+        if variance > 0.0 and own > max(TOO_SURE * variance, LEAST_VARIANCE):
             innovation[NOISE] = max(innovation[NOISE], own / variance)
             measurement[VARIANCE + a] = own
             found = True
@@ -74,9 +81,9 @@ def use_noise(scalars: Array, measurement: Array, innovation: Array) -> bool:
 def _median(scalars: Array, a: int, count: int) -> float:
     """Return the median of the squares of an axis: the value that half of the others are not above."""
     for i in range(count):
-        value, below, equal = scalars[RECEIVER + CHANGES + 3 * i + a], 0, 0
+        value, below, equal = scalars[RECEIVER + CHANGES + 3 * i + a] ** 2, 0, 0
         for j in range(count):
-            other = scalars[RECEIVER + CHANGES + 3 * j + a]
+            other = scalars[RECEIVER + CHANGES + 3 * j + a] ** 2
             below += other < value
             equal += other == value
         if below <= count // 2 < below + equal:
@@ -113,6 +120,17 @@ def has_lasted(scalars: Array) -> bool:
         size += scalars[RECEIVER + OFFSET + a] ** 2
     lasts = SMALL_LASTS if size <= SMALL * SMALL else LASTS
     return bool(scalars[TIME] - scalars[RECEIVER + SINCE] >= lasts)
+
+
+@scalar_kernel
+def is_locked_out(scalars: Array, innovation: Array) -> bool:
+    """Whether no fix was believed for so long that the prediction is wrong, and its velocity by as much."""
+    waited = scalars[TIME] - scalars[RECEIVER + FIRST]
+    if waited < LOCKED_OUT:
+        return False
+    size = innovation[0] ** 2 + innovation[1] ** 2 + innovation[2] ** 2
+    scalars[RECEIVER + SPEED_VARIANCE] = size / (waited * waited)
+    return True
 
 
 @scalar_kernel

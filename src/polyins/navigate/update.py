@@ -304,10 +304,13 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) 
         scalars[RECEIVER + receiver.SERIES] = 0.0
         scalars[RECEIVER + receiver.DOUBTS] = max(0.0, scalars[RECEIVER + receiver.DOUBTS] - 1.0)
         return ACCEPTED
+    if scalars[RECEIVER + receiver.SERIES] == 0.0:
+        scalars[RECEIVER + receiver.FIRST] = scalars[TIME]
     scalars[RECEIVER + receiver.DOUBTS] = min(receiver.MOST_DOUBTS, scalars[RECEIVER + receiver.DOUBTS] + 1.0)
+    scalars[RECEIVER + receiver.SPEED_VARIANCE] = 0.0
     if not of_series:
         receiver.begin_series(scalars, innovation)
-    elif receiver.has_lasted(scalars):
+    if (of_series and receiver.has_lasted(scalars)) or receiver.is_locked_out(scalars, innovation):
         scalars[RECEIVER + receiver.SERIES] = scalars[RECEIVER + receiver.DOUBTS] = 0.0
         return RESET
     receiver.doubt(work.measurement, innovation, of_series)
@@ -350,6 +353,13 @@ def _reset_each(state: State, plan: Plan, work: Work, rows: int) -> None:
                 block[P + a * stride + j] = 0.0
                 block[P + j * stride + a] = 0.0
             block[P + a * (stride + 1)] = work.noise[a]
+        speed_variance = state.scalars[RECEIVER + receiver.SPEED_VARIANCE]
+        for a in range(3, 6):
+            if speed_variance > 0.0:
+                for j in range(stride):
+                    block[P + a * stride + j] = 0.0
+                    block[P + j * stride + a] = 0.0
+                block[P + a * (stride + 1)] = speed_variance
         _shift(state, plan, s, residual, work.noise)
     update_derived(state, plan, work)
 
@@ -368,6 +378,14 @@ def _reset_joint(state: State, plan: Plan, work: Work, further: Further) -> None
         for i in range(a, size, stride):
             for j in range(a, size, stride):
                 state.joint[i, j] = work.noise[a] * (1.0 + OWN_SHARE * (i == j))
+    speed_variance = state.scalars[RECEIVER + receiver.SPEED_VARIANCE]
+    for a in range(3, 6):
+        if speed_variance > 0.0:
+            for i in range(a, size, stride):
+                for j in range(size):
+                    state.joint[i, j] = 0.0
+                    state.joint[j, i] = 0.0
+                state.joint[i, i] = speed_variance
     joint.scatter(state.blocks, plan.spans.shape[0], state.joint, stride)
     for s in range(plan.spans.shape[0]):
         if state.silent[0, s] < 0.0:

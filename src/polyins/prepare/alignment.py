@@ -254,6 +254,8 @@ class _Search:
             std = float(self.error_std[bodies, :3].mean()) / np.sqrt(len(bodies)) if bodies else 0.0
             if len(shown) > 1:
                 gnss = without_rows_after(self.recording.gnss, float(last))
+                if still:
+                    gnss = as_noisy_as_at_rest(gnss, self.recording.geodetic, *still)
                 turned = self._turning(after, shown, still)
                 bias_std = 0.1 * std if still else std
                 found = find_motion(gnss, self.recording.geodetic, turned, bias_std, after)
@@ -612,6 +614,20 @@ def keeps_place(fixes: GnssStream | None, geodetic: bool, begin: float, end: flo
     drift = np.hypot(*np.polyfit(time, place, 1)[0])
     std = float(np.median(fixes.position_std[inside, :2])) / np.sqrt(float(np.sum(time**2)))
     return bool(drift <= 4.0 * std + 0.1 <= SLOW)
+
+
+def as_noisy_as_at_rest(gnss: GnssStream, geodetic: bool, begin: float, end: float) -> GnssStream:
+    """Return fixes with at least the std that they show at a standstill, where that is more than twice the stated."""
+    inside = np.flatnonzero((gnss.time >= begin) & (gnss.time <= end))
+    if len(inside) < AROUND:
+        return gnss
+    place = displacement(gnss.position[inside], gnss.position[inside[0]], geodetic)
+    # of a normal variable, by the median of what is off the median: one that lies changes little
+    shown = 1.4826 * np.median(np.abs(place - np.median(place, axis=0)), axis=0)
+    stated = np.median(gnss.position_std[inside], axis=0)
+    return replace(
+        gnss, position_std=np.where(shown > 2.0 * stated, np.maximum(gnss.position_std, shown), gnss.position_std)
+    )
 
 
 def without_rows_after(gnss: GnssStream, time: float) -> GnssStream:

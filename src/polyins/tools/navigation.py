@@ -26,6 +26,7 @@ from polyins.navigate import batch
 from polyins.navigate.choice import Choice, choose
 from polyins.prepare.alignment import Start
 from polyins.prepare.timesync import Aligned
+from polyins.prepare.votes import disagreements
 from polyins.reading.long_recording import STRETCH_S, LongRecording
 from polyins.report.decimation import kept_for_display
 
@@ -102,13 +103,14 @@ def _parts(
     stretches = recording.stretches(start.time, end, stretch_s)
     run: batch.Prepared | None = None
     silent = _Silences(recording.head, choice)
+    votes = disagreements(recording.head.rig, recording.beginning())
     for stretch in _whole_logs(stretches):
         silent.add(stretch)
         run = _laid_out(row, choice, recording, stretch, start) if run is None else run.at(stretch)
         part = batch.navigate(run)
         if progress:
             progress(float((stretch.time[-1] - start.time) / (end - start.time)))
-        known = (*notes(recording.head.warnings), *recording.findings, *silent.findings())
+        known = (*notes(recording.head.warnings), *recording.findings, *votes, *silent.findings())
         span = min(one.first for one in recording.extents), max(one.last for one in recording.extents)
         yield replace(part, findings=known, recording_span=span)
 

@@ -1,0 +1,111 @@
+"""Which IMU of an array disagrees with the others: means over windows against their median, and what explains them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.model.findings import Finding
+from polyins.model.rig import DEG, Rig
+from polyins.prepare.timesync import Aligned
+
+Array = NDArray[np.float64]
+
+WINDOW = 5.0
+"""s over which rates and forces are averaged"""
+SIGMAS = 6.0
+LASTING = 2
+"""windows in a row"""
+MISALIGNED = 0.02
+"""rad, about a degree: of the rate or force, which an IMU may have too much or too little along another axis"""
+LEVER = 0.1
+"""m, to which the place of an IMU is known"""
+UNEQUAL = 3.0
+"""times noisier than another, from which an IMU is named"""
+AXES = ("x", "y", "z")
+
+
+def disagreements(rig: Rig, aligned: Aligned) -> tuple[Finding, ...]:
+    """Return which of three IMUs and more, or which pair, differ in rate or force by more than their figures explain.
+
+    Of each the axis where it is most; `aligned` in array axes. A rig with wheels has IMUs that turn differently: none.
+    """
+    count = len(rig.imus)
+    length = max(2, round(WINDOW * aligned.rate_hz))
+    windows = (len(aligned.time) - 1) // length
+    if rig.has_wheels or count < 2 or windows < LASTING:
+        return ()
+    used = slice(1, 1 + windows * length)
+    edges = aligned.time[np.arange(windows + 1) * length]
+    mean = aligned.increments[used].reshape(windows, length, 6, count).sum(axis=1) / np.diff(edges)[:, None, None]
+    mean -= np.array([imu.initial_errors.as_array()[:6] for imu in rig.imus]).T
+    whole = ~np.asarray(aligned.missing[used].reshape(windows, length, count).any(axis=1))
+    middle = np.median(mean, axis=2, keepdims=True)
+    allowed = SIGMAS * _std(rig, middle[:, :, 0]) + _unmodelled(middle[:, :, 0])[:, :, None]
+    over = np.where(whole[:, None, :], np.abs(mean - middle) / allowed, 0.0)
+    return (*_unequal(rig), *_found(rig, mean - middle, over, edges))
+
+
+def _std(rig: Rig, middle: Array) -> Array:
+    """Return how far each IMU may be from the median by what is known of it, shape (W, 6, N)."""
+    known = np.array([imu.start_std() for imu in rig.imus])
+    bias, scale = known[:, :6].T, known[:, 6:12].T
+    walk = np.array([[*imu.noise.angle_random_walk, *imu.noise.velocity_random_walk] for imu in rig.imus]).T
+    own = np.sqrt(bias**2 + (scale * np.abs(middle)[:, :, None]) ** 2 + walk**2 / WINDOW)
+    others = np.median(own, axis=2, keepdims=True)
+    return np.asarray(np.hypot(own, others))
+
+
+def _unmodelled(middle: Array) -> Array:
+    """Return what mounts and places explain besides, shape (W, 6)."""
+    rate, force = np.linalg.norm(middle[:, :3], axis=1), np.linalg.norm(middle[:, 3:], axis=1)
+    gyro = MISALIGNED * rate + 0.02 * DEG
+    accel = MISALIGNED * force + LEVER * rate**2
+    return np.column_stack([np.tile(gyro[:, None], 3), np.tile(accel[:, None], 3)])
+
+
+def _found(rig: Rig, off: Array, over: Array, edges: Array) -> Iterator[Finding]:
+    pair = len(rig.imus) == 2
+    for i, imu in enumerate(rig.imus[:1] if pair else rig.imus):
+        lasting = np.min([over[k : len(over) - LASTING + 1 + k, :, i] for k in range(LASTING)], axis=0)
+        if not (lasting > 1.0).any():
+            continue
+        axis = int(np.argmax(lasting.max(axis=0)))
+        rows = np.flatnonzero(over[:, axis, i] > 1.0)
+        size = float(np.median(off[rows, axis, i])) * (2.0 if pair else 1.0)
+        gyro = axis < 3
+        shown = f"{size / DEG:.3g} deg/s" if gyro else f"{size:.3g} m/s^2"
+        what = f"{'gyro' if gyro else 'accelerometer'} {AXES[axis % 3]}"
+        begin, end = float(edges[rows[0]]), float(edges[rows[-1] + 1])
+        who = f"IMU {imu.name} and IMU {rig.imus[1].name} differ" if pair else f"IMU {imu.name} differs from the others"
+        yield Finding(
+            "disagreement",
+            f"{who} by {shown} in {what} from {begin:.1f} to {end:.1f} s, more than their noise figures explain",
+            "doubt",
+            stream=f"{imu.name}, {rig.imus[1].name}" if pair else imu.name,
+            axis=what,
+            from_s=begin,
+            to_s=end,
+            size=size / DEG if gyro else size,
+            expected=0.0,
+            remedy="look at its mount, axes and units, leave it out, or state its initial_std",
+        )
+
+
+def _unequal(rig: Rig) -> Iterator[Finding]:
+    """Say which IMU is much worse than the best one by its own figures."""
+    noise = np.array([np.mean(imu.noise.angle_random_walk) for imu in rig.imus])
+    worst, best = int(np.argmax(noise)), int(np.argmin(noise))
+    if noise[worst] > UNEQUAL * noise[best] > 0.0:
+        ratio = float(noise[worst] / noise[best])
+        yield Finding(
+            "unequal",
+            f"IMU {rig.imus[worst].name} is {ratio:.0f} times as noisy as IMU {rig.imus[best].name} by its figures; all"
+            " weigh the same",
+            stream=rig.imus[worst].name,
+            size=ratio,
+            expected=1.0,
+            remedy="compare tells whether the better ones alone are better",
+        )
