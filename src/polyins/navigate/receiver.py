@@ -17,8 +17,8 @@ from polyins.navigate.state import RECEIVER, TIME
 
 RING = 11
 """changes of which the median is taken"""
-LEAST_KNOWN, LEAST_IN_DOUBT = 5, 2
-"""of them"""
+LEAST_KNOWN = 5
+"""of them: a jump is in two"""
 MEDIAN_OF_SQUARES = 0.4549 * 6.0
 """median of the squared difference of two changes over the variance of a fix, for normal noise"""
 TOO_SURE = 16.0
@@ -64,7 +64,7 @@ def use_noise(scalars: Array, measurement: Array, innovation: Array) -> bool:
     scalars[RECEIVER + COUNT] += both
     innovation[NOISE] = 1.0
     count = int(min(scalars[RECEIVER + COUNT], float(RING)))
-    if count < (LEAST_IN_DOUBT if scalars[RECEIVER + DOUBTS] > 0.0 else LEAST_KNOWN):
+    if count < LEAST_KNOWN:
         return False
     level = 0.5 * (_median(scalars, 0, count) + _median(scalars, 1, count)) / MEDIAN_OF_SQUARES
     for a in range(3):
