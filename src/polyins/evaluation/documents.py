@@ -63,7 +63,7 @@ class MeasurementCounts(TypedDict):
     mean_nis: float | None
 
 
-class Estimate(TypedDict):
+class OffsetFigures(TypedDict):
     """The last estimate of a sensor's offset or scale."""
 
     estimate: float
@@ -136,7 +136,7 @@ class RunDocument(MethodDocument):
     filter_s: float | None
     first_call_s: float
     measurements: dict[str, MeasurementCounts]
-    offsets: dict[str, Estimate]
+    offsets: dict[str, OffsetFigures]
     start: dict[str, object]
     verdict: VerdictDocument
     coverage: CoverageFigures

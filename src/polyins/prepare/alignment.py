@@ -15,7 +15,7 @@ from polyins.model.geodesy import displacement, metres_per_unit
 from polyins.model.recording import GnssStream, Recording, StartOptions
 from polyins.model.rig import DEG, Rig
 from polyins.prepare.timesync import Aligned
-from polyins.prepare.under_way import AROUND, HARDEST, Motion, find_motion
+from polyins.prepare.under_way import AROUND, HARDEST, GroundMotion, find_motion
 
 Array = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ class _Search:
         self.errors = np.array([imu.initial_errors.as_array() for imu in recording.rig.imus])
         self.error_std = np.array([imu.start_std() for imu in recording.rig.imus])
         self.fixes = velocities_from_positions(recording.gnss, recording.geodetic) if recording.gnss else None
-        self.motions: dict[float, Motion | None] = {}
+        self.motions: dict[float, GroundMotion | None] = {}
         """under way from a time on"""
 
     def run(self) -> Start:
@@ -235,7 +235,7 @@ class _Search:
             )
         return float(self.aligned.time[np.searchsorted(self.aligned.time, wanted)])
 
-    def _under_way(self, after: float, still: tuple[float, float] | None) -> Motion:
+    def _under_way(self, after: float, still: tuple[float, float] | None) -> GroundMotion:
         motion = self._motion(after, still)
         if motion is None:
             raise InputError(
@@ -244,7 +244,7 @@ class _Search:
             )
         return motion
 
-    def _motion(self, after: float, still: tuple[float, float] | None) -> Motion | None:
+    def _motion(self, after: float, still: tuple[float, float] | None) -> GroundMotion | None:
         """Return the first motion from a time on, with the gyros' biases of a standstill if there was one."""
         if after not in self.motions:
             assert self.recording.gnss is not None

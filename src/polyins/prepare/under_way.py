@@ -51,7 +51,7 @@ HARDEST_STD = 2.0
 
 
 @dataclass(frozen=True)
-class Motion:
+class GroundMotion:
     """How an array moves at a fix."""
 
     time: float
@@ -74,7 +74,7 @@ class Motion:
 
 def find_motion(
     gnss: GnssStream, geodetic: bool, turned: Callable[[Array], Array], bias_std: float, after: float
-) -> Motion | None:
+) -> GroundMotion | None:
     """Find the first fix from `after`, s, on at which the heading can be told; None: there is none.
 
     `turned`: how far the heading has turned at given times, rad, less a constant; `bias_std`: of the gyros, rad/s.
@@ -155,7 +155,7 @@ class _Way:
             told = np.where(length > SLOWEST * duration, np.sqrt(noise) / length, np.inf)
         return np.asarray(np.sqrt(told**2 + (0.5 * bias_std * duration) ** 2 + SLIP_STD**2))
 
-    def motion(self, first: int, last: int, std: float) -> Motion:
+    def motion(self, first: int, last: int, std: float) -> GroundMotion:
         """Return the motion at the first of some fixes, whose last one is given."""
         along = np.exp(1j * np.angle(self.sum[last] - self.sum[first]))
         heading = float(np.angle(along * np.exp(1j * self.yaw[first])))
@@ -173,7 +173,7 @@ class _Way:
         # a parabola is not how a vehicle moves for long
         speed_std = float(np.hypot(speed_std, UNSTEADY_SPEED_STD))
         across = max(speed_std, abs(speed) * std)
-        return Motion(
+        return GroundMotion(
             time=float(self.time[first]),
             heading=heading,
             heading_std=std,
@@ -199,11 +199,11 @@ class _Way:
                 return part
             duration *= 0.7
 
-    def _given(self, first: int, soon: slice, heading: float, std: float, last: int) -> Motion:
+    def _given(self, first: int, soon: slice, heading: float, std: float, last: int) -> GroundMotion:
         """Return the motion where the receiver gives velocities: they tell the acceleration as well."""
         after = self.time[soon] - self.time[first]
         noise = self.velocity_std[first].max() / np.sqrt(float(np.sum((after - after.mean()) ** 2)))
-        return Motion(
+        return GroundMotion(
             time=float(self.time[first]),
             heading=heading,
             heading_std=std,
