@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import polyins as pi
+from polyins.evaluation.errors import compare_to_reference
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import Recording
 from polyins.simulation.run import simulate
@@ -53,14 +54,41 @@ def test_a_step_is_followed_and_doubted(drive: Recording) -> None:
     assert findings["reset"]["size"] == 1
 
 
-def test_noise_that_is_not_stated_is_named_with_its_size(drive: Recording) -> None:
+def noisy(recording: Recording, metres: float, after: float) -> Recording:
+    gnss = recording.gnss
+    assert gnss is not None
+    noise = np.random.default_rng(2).normal(0.0, metres, gnss.position.shape) / metres_per_unit(gnss.position[0], True)
+    return replace(recording, gnss=replace(gnss, position=gnss.position + noise * (gnss.time > after)[:, None]))
+
+
+def heading_over_std(recording: Recording) -> float:
+    """The largest error of the heading over its std."""
+    solution = pi.run(recording)
+    errors = compare_to_reference(solution, recording.reference)
+    assert errors.attitude is not None
+    return float(np.max(np.abs(errors.attitude[:, 2]) / np.sqrt(solution.phi_covariance[errors.covered, 5])))
+
+
+@pytest.mark.parametrize(("after", "expected"), [(0.0, "trust"), (100.0, "doubt")])
+def test_noise_that_is_not_stated_is_named_with_its_size(drive: Recording, after: float, expected: str) -> None:
+    """A standstill shows it before anything is built on it; later the first fixes with it are believed."""
+    level, findings = judged(noisy(drive, 0.5, after))
+    assert level == expected
+    assert drive.gnss is not None
+    stated = float(drive.gnss.position_std[0, 0])
+    assert findings["noise"]["size"] == pytest.approx(0.5 / stated, rel=0.4)
+
+
+def test_noise_that_a_standstill_shows_does_not_bend_the_heading(drive: Recording) -> None:
+    assert heading_over_std(noisy(drive, 1.0, 0.0)) < 4.0
+
+
+def test_a_std_that_no_receiver_has_is_no_promise(drive: Recording) -> None:
     gnss = drive.gnss
     assert gnss is not None
-    noise = np.random.default_rng(2).normal(0.0, 0.5, gnss.position.shape) / metres_per_unit(gnss.position[0], True)
-    level, findings = judged(replace(drive, gnss=replace(gnss, position=gnss.position + noise)))
-    assert level == "doubt"
-    stated = float(gnss.position_std[0, 0])
-    assert findings["noise"]["size"] == pytest.approx(0.5 / stated, rel=0.4)
+    sure = replace(drive, gnss=replace(gnss, position_std=np.full_like(gnss.position_std, 1e-12)))
+    assert heading_over_std(sure) < 4.0
+    assert "noise" in judged(sure)[1]
 
 
 def test_positions_that_are_late_are_doubted(drive: Recording) -> None:

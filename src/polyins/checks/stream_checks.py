@@ -35,6 +35,7 @@ UPRIGHT = 0.5
 """Cosine of the largest angle between up in the array and the mean specific force."""
 MIN_COMMON_S = 2.0
 MAX_STD_M = 10000.0
+MOST_OF_A_WEEK_S = 600000.0
 
 
 def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m: float = 0.0) -> tuple[str, ...]:
@@ -180,6 +181,8 @@ def check_order(source: RowSource, time: Array, remedy: str = "", first_row: int
         raise InputError(
             f"{place}: time {time[row]:.6f} s is repeated ({count} in the file); expected increasing times{remedy}"
         )
+    if steps[row - 1] < -MOST_OF_A_WEEK_S:
+        remedy = "; a week of GPS rolls over: count its time on through the end"
     raise InputError(
         f"{place}: time {time[row]:.6f} s follows {time[row - 1]:.6f} s; expected increasing times{remedy}"
     )

@@ -16,6 +16,8 @@ LEAST = 20
 """fixes from which noise and delay are told"""
 MUCH_NOISE = 100.0
 """times the stated variance, from which it is doubted what the filter made of the first of them"""
+SOON = 6
+"""fixes in which noise is found"""
 NOISY_SHARE = 0.02
 LONGEST_BREAK = 5.0
 """s between two fixes of one jump, or two changes of the velocity that tell a delay"""
@@ -36,10 +38,7 @@ def of_receiver(kind: str, measured: Innovations) -> Iterator[Finding]:
         return
     yield from _noise(kind, measured)
     yield from _delay(kind, measured)
-    ratio = float(np.median(np.sqrt(np.mean((measured.residual / measured.std) ** 2, axis=1))))
-    if ratio < TOO_MODEST:
-        text = f"{kind}: innovations are {1.0 / ratio:.0f} times as small as stated: its std is too large"
-        yield Finding("too modest", text, stream=kind, size=ratio, expected=1.0)
+    yield from _modesty(kind, measured)
 
 
 def _jumps(kind: str, measured: Innovations) -> Iterator[Finding]:
@@ -78,7 +77,7 @@ def _noise(kind: str, measured: Innovations) -> Iterator[Finding]:
         "noise",
         f"{kind}: {ratio:.1f} times as noisy from fix to fix as stated, in {noisy.size} of {measured.time.size} fixes"
         f" from {begin:.1f} to {end:.1f} s; that noise was used",
-        "doubt" if ratio**2 > MUCH_NOISE else "note",
+        "doubt" if ratio**2 > MUCH_NOISE and _believed(measured, int(noisy[0])) else "note",
         stream=kind,
         from_s=begin,
         to_s=end,
@@ -86,6 +85,30 @@ def _noise(kind: str, measured: Innovations) -> Iterator[Finding]:
         expected=1.0,
         remedy="position_std_m takes the place of what the file says",
     )
+
+
+def _believed(measured: Innovations, first: int) -> bool:
+    """Whether fixes were believed, just before their noise was found, that were much worse than stated."""
+    before = slice(max(0, first - SOON), first)
+    scaled = measured.nis[before] / np.maximum(measured.rows[before], 1)
+    return bool(np.any(scaled[measured.accepted[before]] > MUCH_NOISE))
+
+
+def _modesty(kind: str, measured: Innovations) -> Iterator[Finding]:
+    """Say that a receiver is much better from fix to fix than it states.
+
+    The difference of two changes is the noise of three fixes, with six times the variance of one.
+    """
+    if measured.change is None or not measured.change.any():
+        return  # no changes are noted without a gate
+    near = np.flatnonzero((np.diff(measured.time)[1:] < LONGEST_BREAK) & (np.diff(measured.time)[:-1] < LONGEST_BREAK))
+    if near.size < LEAST:
+        return
+    noise = np.diff(measured.change, axis=0)[near + 1] / np.sqrt(6.0)
+    ratio = float(np.median(np.sqrt(np.mean((noise / measured.std[near + 2]) ** 2, axis=1))))
+    if ratio < TOO_MODEST:
+        text = f"{kind}: {1.0 / ratio:.0f} times less noisy from fix to fix than stated: its std is too large"
+        yield Finding("too modest", text, stream=kind, size=ratio, expected=1.0)
 
 
 def _delay(kind: str, measured: Innovations) -> Iterator[Finding]:

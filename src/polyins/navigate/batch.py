@@ -28,8 +28,8 @@ from polyins.navigate.layout import Bank
 from polyins.navigate.state import Further, Inputs, Navigators, Outputs, Plan, State, further_work
 from polyins.prepare import alignment, rigid, timesync, wheels
 from polyins.prepare.alignment import Start
+from polyins.prepare.data_findings import of_data
 from polyins.prepare.timesync import Aligned
-from polyins.prepare.votes import disagreements
 
 Array = NDArray[np.float64]
 
@@ -156,7 +156,8 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     choice = choose(row, recording.rig, imu)
     recording = recording.subset(choice.all)
     aligned = timesync.align(recording.imus, bridge=not recording.rig.has_wheels)
-    aligned = replace(aligned, findings=(*aligned.findings, *disagreements(recording.rig, aligned)))
+    of_them = of_data(recording, aligned, float(aligned.time[-1]))
+    aligned = replace(aligned, findings=(*aligned.findings, *of_them))
     start = start_of(row, recording, aligned)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)

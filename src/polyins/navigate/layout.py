@@ -15,6 +15,7 @@ from polyins.model.methods import Method
 from polyins.model.recording import FilterOptions, Recording
 from polyins.model.rig import DEG, AidingSensor, Imu, NoiseGrade, Rig
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place, stride_for
+from polyins.navigate import receiver
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice
 from polyins.navigate.state import Navigators, Plan, State, empty_state, empty_work
@@ -225,6 +226,8 @@ def _fill_scalars(scalars: Array, recording: Recording, start: Start) -> None:
         np.cos(latitude),
         recording.options.gravity,
     )
+    if start.fix_std is not None:
+        receiver.expect(scalars, start.fix_std)
 
 
 def _plan(row: Method, choice: Choice, seats: Bank, recording: Recording, rows: int, stride: int) -> Plan:

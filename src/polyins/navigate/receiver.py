@@ -11,6 +11,8 @@ nothing else, is set to it.
 
 from __future__ import annotations
 
+import numpy as np
+
 from polyins.aiding.measurement import VARIANCE
 from polyins.kernels.jit import Array, scalar_kernel
 from polyins.navigate.state import RECEIVER, TIME
@@ -23,8 +25,8 @@ MEDIAN_OF_SQUARES = 0.4549 * 6.0
 """median of the squared difference of two changes over the variance of a fix, for normal noise"""
 TOO_SURE = 16.0
 """times the stated variance, from which the one that was found is used"""
-LEAST_VARIANCE = 0.02**2
-"""m^2: below, the IMUs are no better"""
+LEAST_VARIANCE = 0.005**2
+"""m^2: no receiver on a vehicle is better; one that states less is believed when its noise has shown it"""
 LONGEST = 5.0
 """s between two fixes from which noise is told"""
 SAME = 0.5
@@ -49,6 +51,14 @@ D, NOISE = 7, 10
 """places in a row of `Outputs.innovations`: the change from fix to fix, and the ratio of the noise that is used"""
 
 
+def expect(scalars: Array, std: Array) -> None:
+    """Begin with what is known of the noise of fixes, m (3,), as if five changes had shown it."""
+    shown = np.sqrt(MEDIAN_OF_SQUARES) * np.array([np.hypot(std[0], std[1]) / np.sqrt(2.0)] * 2 + [std[2]])
+    place = RECEIVER + CHANGES
+    scalars[place : place + 3 * LEAST_KNOWN] = np.tile(shown, LEAST_KNOWN)
+    scalars[RECEIVER + COUNT] = LEAST_KNOWN
+
+
 @scalar_kernel
 def use_noise(scalars: Array, measurement: Array, innovation: Array) -> bool:
     """Note the change since the last fix; raise the variances of a measurement to what is found of them."""
@@ -65,7 +75,7 @@ def use_noise(scalars: Array, measurement: Array, innovation: Array) -> bool:
     innovation[NOISE] = 1.0
     count = int(min(scalars[RECEIVER + COUNT], float(RING)))
     if count < LEAST_KNOWN:
-        return False
+        return _limit(measurement)
     level = 0.5 * (_median(scalars, 0, count) + _median(scalars, 1, count)) / MEDIAN_OF_SQUARES
     for a in range(3):
         variance = measurement[VARIANCE + a]
@@ -75,6 +85,17 @@ def use_noise(scalars: Array, measurement: Array, innovation: Array) -> bool:
             measurement[VARIANCE + a] = own
             found = True
     return found
+
+
+@scalar_kernel
+def _limit(measurement: Array) -> bool:
+    """Raise variances that are below the least one; return whether there are any."""
+    raised = False
+    for a in range(3):
+        if 0.0 < measurement[VARIANCE + a] < LEAST_VARIANCE:
+            measurement[VARIANCE + a] = LEAST_VARIANCE
+            raised = True
+    return raised
 
 
 @scalar_kernel

@@ -57,6 +57,8 @@ class Start:
     """what was used for each of them, in words"""
     imu_attitudes: Array | None = None
     """roll, pitch, heading of each IMU of a rig with wheels, rad, shape (N, 3)"""
+    fix_std: Array | None = None
+    """of a fix as they scatter at a standstill, m, shape (3,); None: there is none"""
 
     @classmethod
     def known(
@@ -152,6 +154,10 @@ class _Search:
 
     def run(self) -> Start:
         still = self._standstill()
+        known, fix_std = self.recording, None
+        if known.gnss is not None and still:
+            fix_std = scatter_at_rest(known.gnss, known.geodetic, *still)
+            self.recording = replace(known, gnss=as_noisy_as_at_rest(known.gnss, known.geodetic, *still))
         time = self._time(still)
         velocity, velocity_std = self._velocity(time, still)
         roll_pitch, tilt_std = self._roll_pitch(time, still, velocity)
@@ -182,6 +188,7 @@ class _Search:
             imu_errors=self.errors,
             imu_error_std=self.error_std,
             sources=self.sources,
+            fix_std=fix_std,
         )
 
     def _standstill(self) -> tuple[float, float] | None:
@@ -254,8 +261,6 @@ class _Search:
             std = float(self.error_std[bodies, :3].mean()) / np.sqrt(len(bodies)) if bodies else 0.0
             if len(shown) > 1:
                 gnss = without_rows_after(self.recording.gnss, float(last))
-                if still:
-                    gnss = as_noisy_as_at_rest(gnss, self.recording.geodetic, *still)
                 turned = self._turning(after, shown, still)
                 bias_std = 0.1 * std if still else std
                 found = find_motion(gnss, self.recording.geodetic, turned, bias_std, after)
@@ -616,18 +621,26 @@ def keeps_place(fixes: GnssStream | None, geodetic: bool, begin: float, end: flo
     return bool(drift <= 4.0 * std + 0.1 <= SLOW)
 
 
-def as_noisy_as_at_rest(gnss: GnssStream, geodetic: bool, begin: float, end: float) -> GnssStream:
-    """Return fixes with at least the std that they show at a standstill, where that is more than twice the stated."""
+def scatter_at_rest(gnss: GnssStream, geodetic: bool, begin: float, end: float) -> Array | None:
+    """Return the std that fixes show at a standstill, m (3,), where that is more than stated; None: too few are in it.
+
+    Of a normal variable, by the median of what is off the median: one that lies changes little.
+    """
     inside = np.flatnonzero((gnss.time >= begin) & (gnss.time <= end))
     if len(inside) < AROUND:
-        return gnss
+        return None
     place = displacement(gnss.position[inside], gnss.position[inside[0]], geodetic)
-    # of a normal variable, by the median of what is off the median: one that lies changes little
     shown = 1.4826 * np.median(np.abs(place - np.median(place, axis=0)), axis=0)
-    stated = np.median(gnss.position_std[inside], axis=0)
-    return replace(
-        gnss, position_std=np.where(shown > 2.0 * stated, np.maximum(gnss.position_std, shown), gnss.position_std)
-    )
+    return np.asarray(np.maximum(shown, np.median(gnss.position_std[inside], axis=0)))
+
+
+def as_noisy_as_at_rest(gnss: GnssStream, geodetic: bool, begin: float, end: float) -> GnssStream:
+    """Return fixes with at least the std that they show at a standstill, where that is more than twice the stated."""
+    shown = scatter_at_rest(gnss, geodetic, begin, end)
+    if shown is None:
+        return gnss
+    std = gnss.position_std
+    return replace(gnss, position_std=np.where(shown > 2.0 * std, np.maximum(std, shown), std))
 
 
 def without_rows_after(gnss: GnssStream, time: float) -> GnssStream:

@@ -27,6 +27,12 @@ TARGETS = (
         pictures=True,
         seconds=(12, 120),
     ),
+    Target(
+        "robustness",
+        "polyins.studies.robustness.table:reproduce",
+        seconds=(50, 240),
+        print_tables="polyins.studies.robustness.table:print_tables",
+    ),
 )
 
 GROUP = "polyins.targets"

@@ -25,8 +25,8 @@ from polyins.model.solution import Solution
 from polyins.navigate import batch
 from polyins.navigate.choice import Choice, choose
 from polyins.prepare.alignment import Start
+from polyins.prepare.data_findings import of_data
 from polyins.prepare.timesync import Aligned
-from polyins.prepare.votes import disagreements
 from polyins.reading.long_recording import STRETCH_S, LongRecording
 from polyins.report.decimation import kept_for_display
 
@@ -103,7 +103,7 @@ def _parts(
     stretches = recording.stretches(start.time, end, stretch_s)
     run: batch.Prepared | None = None
     silent = _Silences(recording.head, choice)
-    votes = disagreements(recording.head.rig, recording.beginning())
+    votes = of_data(recording.head, recording.beginning(), recording.span[1])
     for stretch in _whole_logs(stretches):
         silent.add(stretch)
         run = _laid_out(row, choice, recording, stretch, start) if run is None else run.at(stretch)

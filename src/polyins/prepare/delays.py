@@ -1,0 +1,279 @@
+"""Whether clocks agree: how late each IMU is against the others, and the fixes against the IMUs.
+
+IMUs of one array turn together: the rates of one, against the mean of the others, fit best at the delay between them.
+A receiver's course turns as the gyros do: the angle between one displacement and the next, against what the gyros
+turned meanwhile. Neither needs a filter, which would take part of a delay for errors of the state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.model.findings import Finding, Severity
+from polyins.model.geodesy import displacement
+from polyins.model.recording import GnssStream, Recording
+from polyins.model.rig import Rig
+from polyins.prepare.blocks import Blocks
+
+Array = NDArray[np.float64]
+
+SURE = 6.0
+"""standard deviations by which a delay is not zero"""
+
+PART_S = 50.0
+"""s of rates in which a delay is looked for: a clock may leap"""
+COARSE = 5
+"""blocks, of which means are compared first"""
+STEPS = 3
+"""of least squares"""
+FARTHEST = 2.4
+"""s: delays between IMUs that are looked for"""
+LEAST_IMU_DELAY = 0.012
+"""s: below, it is how chips filter"""
+UNLIKE = 0.5
+"""share of the power of rates that may be left at the best delay"""
+LEAST_TURNING = 0.02
+"""rad/s rms: less is no motion to compare"""
+HARMFUL = 0.05
+"""s, from which the delay of an IMU is more than a note"""
+
+TURNS, LEAST_TURNS = 60, 25
+"""of the course, that tell one delay"""
+FARTHEST_FIXES = 25.0
+"""s: delays of fixes that are looked for; leap seconds are 18"""
+ROUGH, STEP = 0.5, 0.1
+"""s, of the search: everywhere, and near what it finds"""
+LEAST_FIX_DELAY = 0.05
+"""s: below, it is the receiver's own latency"""
+ROUGHLY_LIKE, COURSE_LIKE = 0.7, 0.9
+"""least correlation of the turns of course and gyros: a vehicle that moves sideways shows none"""
+AS_GOOD = 2.0
+"""times the misfit of the best delay, up to which another is as good"""
+LEAST_TURN = 0.05
+"""rad rms, from one displacement to the next"""
+SURE_COURSE = 8.0
+"""times the noise of the fixes, least length of a displacement that has a course"""
+HOPELESS = 2.0
+"""s: of fixes that are off by more, and all along, there is no solution"""
+DOUBTFUL, USELESS = 3.0, 10.0
+"""standard deviations of the fixes by which the vehicle moves in the delay"""
+
+
+@dataclass(frozen=True)
+class _Delay:
+    """What one part of a recording tells."""
+
+    begin: float
+    end: float
+    delay: float
+    """s; above zero: late"""
+    std: float
+
+
+def delays(recording: Recording, blocks: Blocks) -> tuple[Finding, ...]:
+    """Return which IMU, and whether the receiver, is late, and by how much; of an array without wheels.
+
+    `blocks`: of its IMUs, or of the beginning of what they measured. Raises InputError if all fixes are late by so much
+    that they belong to another time.
+    """
+    rig, gnss = recording.rig, recording.gnss
+    if rig.has_wheels:
+        return ()
+    late = [] if len(rig.imus) < 3 else list(_of_imus(rig, blocks))
+    return (*late, *(() if gnss is None else _of_fixes(blocks, gnss, recording.geodetic)))
+
+
+# --- IMUs -------------------------------------------------------------------------------------------------------------
+
+
+def _of_imus(rig: Rig, blocks: Blocks) -> Iterator[Finding]:
+    parts = blocks.parts(PART_S)
+    for i, imu in enumerate(rig.imus):
+        found = []
+        for part in parts:
+            if blocks.whole[part, i].mean() < 0.9:
+                continue
+            told = _lag(blocks.rates[part, :3, i], blocks.middle[part, :3], blocks.interval)
+            if told is not None:
+                found.append(_Delay(float(blocks.time[part][0]), float(blocks.time[part][-1]), *told))
+        off = [one for one in found if abs(one.delay) > max(LEAST_IMU_DELAY, SURE * one.std)]
+        if not off:
+            continue
+        size = _typical(off)
+        often = len(off) > 1 or len(found) == 1 or abs(size) > HARMFUL
+        if often:
+            yield _finding(imu.name, off, size, "doubt" if abs(size) > HARMFUL else "note")
+
+
+def _lag(own: Array, mean: Array, interval: float) -> tuple[float, float] | None:
+    """Return by how much one signal, shape (K, 3), is later than another, s, and how sure that is; None: not told.
+
+    own(t + D) = mean(t). D is m where the mean square of own(t + m) - mean(t) is least, of means over some blocks; near
+    it own(t + m) - mean(t) = (m - D) d mean / dt, which least squares solve.
+    """
+    reach, count = round(FARTHEST / interval) // COARSE, len(own) // COARSE
+    if count < 4 * reach:
+        return None
+    own, mean = (one[: count * COARSE] - one.mean(axis=0) for one in (own, mean))
+    power = float(np.mean(mean**2))
+    if np.sqrt(3.0 * power) < LEAST_TURNING:
+        return None
+    rough_own, rough_mean = (one.reshape(count, COARSE, 3).mean(axis=1) for one in (own, mean))
+    best = int(np.argmin(_misfits(rough_own, rough_mean, reach)))
+    if not 0 < best < 2 * reach:
+        return None
+    margin = reach * COARSE
+    inside = slice(margin, len(mean) - margin)
+    slope = (mean[margin + 1 : len(mean) - margin + 1] - mean[margin - 1 : len(mean) - margin - 1]) / (2.0 * interval)
+    steepness, m = float(np.sum(slope**2)), (best - reach) * COARSE
+    for _ in range(STEPS):
+        off = own[inside.start + m : inside.stop + m] - mean[inside]
+        less = float(np.sum(off * slope)) / steepness
+        delay, m = m * interval - less, m - round(less / interval)
+        if abs(m) > margin:
+            return None
+    left = max(float(np.sum(off**2)) - less**2 * steepness, 0.0) / off.size
+    return None if left > UNLIKE * power else (delay, float(np.sqrt(left / steepness)))
+
+
+def _misfits(own: Array, mean: Array, reach: int) -> Array:
+    """Return the mean squares of own(t + m) - mean(t) for m from -reach to reach; t keeps that from both ends."""
+    known = mean[reach:-reach]
+    products = sum(np.correlate(own[:, a], known[:, a], "valid") for a in range(3))
+    squares = np.concatenate([[0.0], np.cumsum(np.sum(own**2, axis=1))])
+    return np.asarray(squares[len(known) :] - squares[: -len(known)] - 2.0 * products + np.sum(known**2)) / known.size
+
+
+# --- fixes ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Turns:
+    """By how much the course turned from one displacement, or velocity, to the next."""
+
+    begin: Array
+    """s (K,)"""
+    end: Array
+    turned: Array
+    """rad (K,)"""
+    speed: Array
+    """m/s (K,)"""
+
+    def at(self, rows: slice) -> _Turns:
+        return _Turns(self.begin[rows], self.end[rows], self.turned[rows], self.speed[rows])
+
+
+def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Finding]:
+    turns = _turns(gnss, geodetic)
+    steps = np.diff(blocks.time, prepend=blocks.time[0] - blocks.interval)
+    yaw = np.cumsum(blocks.middle[:, 2] * steps)
+    found, speeds = [], []
+    for first in range(0, len(turns.begin) - LEAST_TURNS + 1, TURNS):
+        part = turns.at(slice(first, first + TURNS))
+        told = _best(blocks.time, yaw, part) if len(part.begin) >= LEAST_TURNS else None
+        if told is not None:
+            found.append(_Delay(float(part.begin[0]), float(part.end[-1]), *told))
+            speeds.append(float(np.sqrt(np.mean(part.speed**2))))
+    off = [k for k, one in enumerate(found) if abs(one.delay) > max(LEAST_FIX_DELAY, SURE * one.std)]
+    if not off:
+        return
+    size = _typical([found[k] for k in off])
+    if abs(size) > HOPELESS and 1 < len(off) == len(found) and all(abs(one.delay - size) < STEP for one in found):
+        late = "late" if size > 0.0 else "early"
+        raise InputError(
+            f"GNSS: its course turns as the gyros do, {abs(size):.1f} s {late} all along; expected one clock:"
+            f" gnss.clock_offset_s: {-size:.1f} corrects that"
+        )
+    std = float(np.median(gnss.position_std[:, :2]))
+    moves = abs(size) * max(speeds[k] for k in off) / std
+    severity: Severity = "serious" if moves > USELESS else "doubt" if moves > DOUBTFUL else "note"
+    yield _finding("GNSS position", [found[k] for k in off], size, severity)
+
+
+def _turns(gnss: GnssStream, geodetic: bool) -> _Turns:
+    """Return where the course is known twice running."""
+    if gnss.velocity is not None and gnss.velocity_std is not None:
+        time, way, noise = gnss.time, gnss.velocity[:, :2], gnss.velocity_std[:, :2].max(axis=1)
+        speed = np.hypot(*way.T)
+    else:
+        way = np.diff(displacement(gnss.position, gnss.position[0], geodetic)[:, :2], axis=0)
+        time, std = 0.5 * (gnss.time[1:] + gnss.time[:-1]), gnss.position_std[:, :2].max(axis=1)
+        noise, speed = 1.5 * np.hypot(std[1:], std[:-1]), np.hypot(*way.T) / np.diff(gnss.time)
+    along = way[:, 0] + 1j * way[:, 1]
+    known = np.abs(along) > SURE_COURSE * noise
+    step = np.diff(time)
+    k = np.flatnonzero(known[1:] & known[:-1] & (step < 3.0 * np.median(step))) if len(step) else np.zeros(0, int)
+    return _Turns(time[k], time[k + 1], np.angle(along[k + 1] / along[k]), speed[k])
+
+
+def _best(time: Array, yaw: Array, turns: _Turns) -> tuple[float, float] | None:
+    """Return at which delay the gyros turned as the course did, s, and its std, s; None: not told.
+
+    `yaw` is what they turned up to `time`, rad.
+    """
+    own = turns.turned - turns.turned.mean()
+    first, last = max(-FARTHEST_FIXES, turns.end[-1] - time[-1]), min(FARTHEST_FIXES, turns.begin[0] - time[0])
+    rough = ROUGH * np.arange(np.ceil(first / ROUGH), np.floor(last / ROUGH) + 1.0)
+    if len(rough) < 3 or np.sqrt(np.mean(own**2)) < LEAST_TURN:
+        return None
+    likes = _likes(time, yaw, turns, own, rough)[0]
+    found = []
+    for peak in rough[_peaks(likes, ROUGHLY_LIKE)]:
+        near = peak + STEP * np.arange(-round(ROUGH / STEP), round(ROUGH / STEP) + 1)
+        likes, shifted = _likes(time, yaw, turns, own, near)
+        for best in _peaks(likes, COURSE_LIKE):
+            low, top, high = likes[best - 1 : best + 2]
+            fraction = 0.5 * (low - high) / min(low - 2.0 * top + high, -1e-12)
+            slope = (shifted[best + 1] - shifted[best - 1]) / (2.0 * STEP)
+            left = float(np.mean((own - shifted[best]) ** 2))
+            std = float(np.sqrt(left / max(float(slope @ slope), 1e-12)))
+            found.append((1.0 - top, float(near[best] + fraction * STEP), std))
+    if not found:
+        return None
+    # where bends come again and again several delays fit as well: the least is the likeliest
+    as_good = [one for one in found if one[0] <= AS_GOOD * min(found)[0]]
+    _, delay, std = min(as_good, key=lambda one: abs(one[1]))
+    return delay, std
+
+
+def _likes(time: Array, yaw: Array, turns: _Turns, own: Array, delays: Array) -> tuple[Array, Array]:
+    """Return the correlation of turns at each delay, (D,), and what the gyros turned, (D, K)."""
+    ends = np.stack([turns.begin - delays[:, None], turns.end - delays[:, None]])
+    by_gyros = np.diff(np.interp(ends, time, yaw), axis=0)[0]
+    shifted = by_gyros - by_gyros.mean(axis=1, keepdims=True)
+    size = np.linalg.norm(shifted, axis=1) * np.linalg.norm(own)
+    return shifted @ own / np.maximum(size, 1e-12), shifted
+
+
+def _peaks(likes: Array, least: float) -> NDArray[np.intp]:
+    """Return the places of local maxima."""
+    inner = likes[1:-1]
+    return np.flatnonzero((inner >= likes[:-2]) & (inner >= likes[2:]) & (inner > least)) + 1
+
+
+# --- both -------------------------------------------------------------------------------------------------------------
+
+
+def _typical(found: Sequence[_Delay]) -> float:
+    return float(np.median([one.delay for one in found]))
+
+
+def _finding(stream: str, off: Sequence[_Delay], size: float, severity: Severity) -> Finding:
+    begin, end = off[0].begin, off[-1].end
+    late = "late" if size > 0.0 else "early"
+    return Finding(
+        "delay",
+        f"{stream}: {abs(size):.3g} s {late} from {begin:.0f} to {end:.0f} s, as its turns tell",
+        severity,
+        stream=stream,
+        from_s=begin,
+        to_s=end,
+        size=size,
+        expected=0.0,
+        remedy=f"clock_offset_s: {-size:.3g} corrects that",
+    )

@@ -1,0 +1,79 @@
+"""Which IMU is noisier than the others, by what its figures do not explain.
+
+The noise of an IMU is told from how its rates, less those of the quietest, differ from block to block. Divided by what
+its figures say of it, it is the same for all IMUs of an array that is as modelled; vibration raises it for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.model.findings import Finding
+from polyins.model.rig import Rig
+from polyins.prepare.blocks import Blocks
+
+Array = NDArray[np.float64]
+
+PART_S = 20.0
+"""s in which noise is told"""
+LASTING = 2
+"""parts in a row"""
+NOISY = 4.0
+"""times the noise of the quieter quarter"""
+DOUBTFUL = 10.0
+"""times the noise of the whole array, from which its solution is less sure than stated"""
+OF_MEAN = np.sqrt(np.pi / 2.0) / np.sqrt(6.0)
+"""std of one value by the mean size of the second difference of three"""
+GYRO, ACCEL = slice(0, 3), slice(3, 6)
+
+
+def noisy(rig: Rig, blocks: Blocks) -> tuple[Finding, ...]:
+    """Return which of three IMUs and more are noisy; a rig with wheels has IMUs that turn differently: none."""
+    if rig.has_wheels or len(rig.imus) < 3 or len(blocks.time) < 3:
+        return ()
+    return (*_of_sensor(rig, blocks, GYRO), *_of_sensor(rig, blocks, ACCEL))
+
+
+def _of_sensor(rig: Rig, blocks: Blocks, sensor: slice) -> Iterator[Finding]:
+    parts = blocks.parts(PART_S)
+    density = [imu.noise.angle_random_walk if sensor == GYRO else imu.noise.velocity_random_walk for imu in rig.imus]
+    stated = np.sqrt(np.mean(np.square(density), axis=1) / blocks.interval)
+    shown = np.array([_shown(blocks.rates[part, sensor]) for part in parts])
+    shown[np.array([blocks.whole[part].mean(axis=0) for part in parts]) < 0.9] = np.nan
+    ratio = shown / np.where(stated > 0.0, stated, np.nan)
+    with np.errstate(invalid="ignore"):
+        times = ratio / np.nanquantile(ratio, 0.25, axis=1, keepdims=True)
+    over = times > NOISY
+    lasting = np.array([over[k : k + LASTING].all(axis=0) for k in range(max(len(parts) - LASTING, 0) + 1)]).any(axis=0)
+    doubtful = bool(np.any(np.sqrt(np.nanmean(np.square(times), axis=1)) > DOUBTFUL))
+    for i in np.flatnonzero(lasting):
+        rows = np.flatnonzero(over[:, i])
+        begin = float(blocks.time[parts[rows[0]]][0])
+        end, size = float(blocks.time[parts[rows[-1]]][-1]), float(np.median(times[rows, i]))
+        what = "gyro" if sensor == GYRO else "accelerometer"
+        yield Finding(
+            "noise",
+            f"IMU {rig.imus[i].name}: its {what} is {size:.0f} times as noisy as the others from {begin:.0f} to"
+            f" {end:.0f} s, by their figures",
+            "doubt" if doubtful else "note",
+            stream=rig.imus[i].name,
+            axis=what,
+            from_s=begin,
+            to_s=end,
+            size=size,
+            expected=1.0,
+            remedy="leave it out, or state its noise",
+        )
+
+
+def _shown(rates: Array) -> Array:
+    """Return the std of the noise of each IMU, (N,), of rates (K, 3, N)."""
+    bent = np.diff(rates, n=2, axis=0)
+    quietest = int(np.argmin(np.abs(bent).mean(axis=(0, 1))))
+    variance = (OF_MEAN * np.abs(bent - bent[:, :, quietest, None]).mean(axis=(0, 1))) ** 2
+    # of the quietest and the next one each has half
+    half = 0.5 * np.sort(variance)[1]
+    return np.asarray(np.sqrt(np.maximum(variance - half, half)))
