@@ -47,8 +47,7 @@ def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m:
     """
     if len(rows.time) < 2:
         raise InputError(f"{rows.source.path}: {len(rows.time)} row(s); expected at least 2")
-    check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel})
-    check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
+    check_rows(rows)
     _check_rate(rows)
     _check_accel_unit(rows, off_axis_m)
     rate = _check_gyro_unit(rows, max_rate_rad_s)
@@ -56,6 +55,13 @@ def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m:
     if rate > UNUSUAL_RATE_RAD_S and max_rate_rad_s <= MAX_RATE_RAD_S:
         texts.append(f"turns at {rate:.3g} rad/s (rms), which is unusual; is the gyro's unit {rows.gyro_unit}?")
     return (*rows.warnings, *(f"{rows.source.path}: {text}" for text in texts))
+
+
+def check_rows(rows: ImuRows, first_row: int = 0) -> None:
+    """Raise InputError for NaN and stamps that do not increase; `first_row`: of the rows in the file."""
+    check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel}, first_row)
+    remedy = "; give rate_hz if the file's stamps are wrong and its rows are not"
+    check_order(rows.source, rows.time, remedy, first_row)
 
 
 def check_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.model.recording import Array, usual_interval
+from polyins.model.recording import USUAL_OF, Array
 from polyins.prepare.timesync import GAP
 
 
@@ -101,10 +101,13 @@ def without(rows: ImuRows, bad: NDArray[np.bool_]) -> ImuRows:
 def intervals(time: Array) -> Array:
     """Return the length of the interval that ends at each stamp, s.
 
-    The first is taken to be the usual one, and so is that after a gap: what a rate was in it is not known.
+    The first is taken to be the usual one, and so is that after a gap or a stamp that is out of order or no number:
+    what a rate was in it is not known.
     """
     steps = np.diff(time)
     if not len(steps):
         return np.zeros(len(time))
-    usual = usual_interval(time)
-    return np.concatenate([[usual], np.where(steps > GAP * usual, usual, steps)])
+    if not np.isfinite(time).all():
+        steps[~np.isfinite(steps)] = 0.0
+    usual = float(np.median(steps[:USUAL_OF]))
+    return np.concatenate([[usual], np.where((steps > 0.0) & (steps <= GAP * usual), steps, usual)])

@@ -98,17 +98,21 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     `wheels_known`: check that wheels turn as declared; what calibrates them needs not know yet.
     """
     notes = wheel_checks.check_settings(config, document)
-    mounted = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
-    imus, streams, warnings = zip(*mounted, strict=True)
-    notes += _one_by_kind([text for texts in warnings for text in texts])
-    faults.check_alive(streams)
+    alone = len(config.imus) == 1
+    found = [read_imu(entry, index, document, alone=alone) for index, entry in enumerate(config.imus)]
+    alive, dead = faults.alive([one.stream for one in found])
+    known, config = config, config.model_copy(update={"imus": tuple(config.imus[i] for i in alive)})
+    notes += _one_by_kind([text for i in alive for text in found[i].check(i, document)])
+    imus, streams = tuple(found[i].imu for i in alive), tuple(found[i].stream for i in alive)
+    findings = (*dead, *(finding for i in alive for finding in found[i].findings))
     faults.check_distinct(streams)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
     notes += [clocks.described(offset) for offset in offsets]
     span = stream_checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})
     recording = assemble(config, document, imus, streams, span, wheels_known)
     warnings = (*notes, *recording.warnings)
-    return replace(recording, warnings=warnings, clock_offsets=offsets, config_text=in_force(config, offsets))
+    text = in_force(known, offsets)
+    return replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
 
 
 def assemble(

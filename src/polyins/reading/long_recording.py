@@ -133,24 +133,29 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
         return None
     if sum(_rows_at_most(entry.file) for entry in config.imus) < least_rows:
         return None
-    files = tuple(ImuFile(entry) for entry in config.imus)
+    alone = len(config.imus) == 1
+    files = tuple(ImuFile(entry, alone=alone) for entry in config.imus)
     extents = tuple(file.extent() for file in files)
     if sum(extent.rows for extent in extents) < least_rows:
         return None
     notes = wheel_checks.check_settings(config, document)
+    alive, dead = faults.alive([extent.sample for extent in extents])
+    known, config = config, config.model_copy(update={"imus": tuple(config.imus[i] for i in alive)})
+    files, extents = tuple(files[i] for i in alive), tuple(extents[i] for i in alive)
     span = _span(files, extents)
     if _pauses(extents):
         return None  # each part is a run of its own
     until = _head_end(config, document, extents, span)
     streams = tuple(StretchReader(file).until(until, span[0]) for file in files)
-    for number in range(len(files)):
-        notes += (*_checked(files[number], streams[number], number, document), *extents[number].warnings)
-    faults.check_alive(streams)
+    for number, index in enumerate(alive):
+        notes += _checked(files[number], streams[number], index, document)
     faults.check_distinct(streams)
     imus = tuple(as_mounted(entry) for entry in config.imus)
     head = loading.assemble(config, document, imus, streams, span)
     warnings = (*warnings, *notes, *head.warnings)
-    return LongRecording(replace(head, warnings=warnings, config_text=loading.in_force(config)), files, extents, span)
+    findings = (*dead, *(finding for extent in extents for finding in extent.findings))
+    text = loading.in_force(known)
+    return LongRecording(replace(head, warnings=warnings, findings=findings, config_text=text), files, extents, span)
 
 
 def _pauses(extents: Sequence[StreamExtent]) -> bool:
