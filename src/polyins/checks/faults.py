@@ -44,8 +44,8 @@ def without_faults(rows: ImuRows, name: str, clock_offset: float) -> tuple[ImuRo
     time, place = rows.time + clock_offset, f"{rows.source.path}: IMU {name}"
     zeros, frozen = _zeros(rows), _frozen(rows)
     found = (
-        *left_out("zeros", f"{place} shows zeros only", time, zeros, name),
-        *left_out("frozen", f"{place} repeats the same values", time, frozen & ~zeros, name),
+        *left_out("zeros", place, time, zeros, name),
+        *left_out("frozen", place, time, frozen & ~zeros, name),
     )
     bad = zeros | frozen
     return (without(rows, bad) if bad.any() else rows), found

@@ -79,7 +79,7 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
         "verdict": judged.document(),
         "coverage": coverage(solution, figures.epochs),
         "exclusions": [
-            {"imu": one.stream, "from_s": one.from_s, "to_s": one.to_s, "cause": one.size, "statistic": None}
+            {"imu": one.stream, "from_s": one.from_s, "to_s": one.to_s, "cause": one.text, "statistic": None}
             for one in judged.findings
             if one.kind == LEFT_OUT
         ],

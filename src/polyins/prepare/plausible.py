@@ -13,11 +13,13 @@ class Limits:
     """rad/s"""
     force: float
     """m/s^2"""
+    rms_rate: float
+    """rad/s, over a recording"""
 
 
-BODY = Limits(80.0, 500.0)
+BODY = Limits(80.0, 500.0, rms_rate=10.0)
 """Gyros for navigation end at 4,000 deg/s, their accelerometers at 40 g."""
-WHEEL = Limits(400.0, 5000.0)
+WHEEL = Limits(400.0, 5000.0, rms_rate=100.0)
 """Gyros for fast spin end at 20,000 deg/s; off the axis of a wheel its centripetal acceleration comes on top."""
 
 

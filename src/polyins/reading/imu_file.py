@@ -10,7 +10,6 @@ import numpy as np
 
 from polyins.checks.no_data import AFTER, LEAP
 from polyins.config import ImuColumns, ImuEntry
-from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats import columns, kf_gins, table
 from polyins.formats.columns import Column
@@ -111,7 +110,7 @@ class ImuFile:
             yield held
 
     def _ends_after_leap(self, values: list[Array]) -> bool:
-        if self.entry.rate_hz or self.columns.time is None or self.alone:
+        if self.entry.rate_hz or self.columns.time is None:
             return False
         steps = np.diff(values[-1][-AFTER - 1 :]) * table.SECONDS[self.columns.time.unit]
         return bool((steps > LEAP).any())

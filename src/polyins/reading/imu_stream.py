@@ -29,6 +29,8 @@ FULL = 0.999
 """A rate above this part of the full scale has reached it."""
 MOST_SATURATED = 0.1
 """of the rows"""
+MOST_LOST = 0.1
+"""of the rows of the only IMU that are no numbers or out of order"""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class ReadImu:
 def read_imu(entry: ImuEntry, index: int, document: Document, *, alone: bool) -> ReadImu:
     """Read the IMU of that index; `alone`: there is no other one that could go on without it.
 
-    Raises InputError for a file that cannot be read; of an IMU that is alone for rows, too, that are not numbers or out
+    Raises InputError for a file that cannot be read; of an IMU that is alone, too, if many rows are not numbers or out
     of order.
     """
     with document.at(["imus", index, "file"]):
@@ -77,11 +79,9 @@ def measured(rows: ImuRows, entry: ImuEntry, *, alone: bool, first_row: int = 0)
     `first_row`: of the rows in the file.
     """
     name, offset = entry.name, entry.clock_offset_s
-    found: tuple[Finding, ...] = ()
-    if alone:
-        stream_checks.check_rows(rows, first_row)
-    else:
-        rows, found = without_nonsense(rows, name, offset)
+    known, (rows, found) = rows, without_nonsense(rows, name, offset)
+    if alone and len(rows.time) < max(2.0, (1.0 - MOST_LOST) * len(known.time)):
+        stream_checks.check_rows(known, first_row)
     rows, beyond = within_any_range(rows, name, offset, limits_of(on_wheel=entry.wheel is not None))
     rows, faults = without_faults(rows, name, offset)
     return rows, (*found, *beyond, *faults)

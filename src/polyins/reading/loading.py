@@ -108,7 +108,8 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     faults.check_distinct(streams)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
     notes += [clocks.described(offset) for offset in offsets]
-    span = stream_checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})
+    spans = {stream.name: (stream.time[0], stream.time[-1]) for stream in streams}
+    span = stream_checks.check_common_span(spans, wait=any(imu.wheel for imu in imus))
     recording = assemble(config, document, imus, streams, span, wheels_known)
     warnings = (*notes, *recording.warnings)
     text = in_force(known, offsets)
