@@ -64,15 +64,15 @@ def check_rows(rows: ImuRows, first_row: int = 0) -> None:
     check_order(rows.source, rows.time, remedy, first_row)
 
 
-def check_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> None:
-    """Raise InputError if the mean specific force in array axes does not point up, with axes that would make it so.
+def off_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> str:
+    """Say that the mean specific force in array axes does not point up, with axes that would make it so; or nothing.
 
     `dvel`: m/s in array axes (forward, right, down), shape (T, 3); `axes` as configured.
     """
     force = dvel[1:].sum(axis=0) / (time[-1] - time[0])
     if -force[2] >= UPRIGHT * np.linalg.norm(force):
-        return
-    raise InputError(
+        return ""
+    return (
         f"{place}: IMU {name}: with axes [{', '.join(axes)}] the mean specific force is "
         f"[{', '.join(f'{f:.1f}' for f in force)}] m/s^2 forward, right, down; expected about [0, 0, -9.8]. "
         f"Try axes: [{', '.join(upright_axes(axes, force))}]"

@@ -48,13 +48,9 @@ class ReadImu:
     findings: tuple[Finding, ...]
     """what is left out of the file"""
 
-    def check(self, index: int, document: Document) -> tuple[str, ...]:
-        """Return warnings of rates, units and axes; raise InputError for those that cannot be right."""
-        warnings = checked(self.rows, self.entry)
-        if self.entry.wheel is None:
-            place = document.place(["imus", index, "axes"])
-            stream_checks.check_upright(self.entry.name, place, self.entry.axes, self.stream.time, self.stream.dvel)
-        return (*warnings, *self.warnings)
+    def check(self) -> tuple[str, ...]:
+        """Return warnings of rates and units; raise InputError for those that cannot be right."""
+        return (*checked(self.rows, self.entry), *self.warnings)
 
 
 def read_imu(entry: ImuEntry, index: int, document: Document, *, alone: bool) -> ReadImu:

@@ -22,7 +22,7 @@ from polyins.model.recording import ImuStream, Recording
 from polyins.navigate.restart import HOPELESS
 from polyins.prepare import timesync
 from polyins.prepare.timesync import Aligned, Whole
-from polyins.reading import loading
+from polyins.reading import loading, usable
 from polyins.reading.imu_file import ImuFile, StreamExtent, StretchReader, can_be_read_in_order
 from polyins.reading.imu_stream import as_mounted
 
@@ -147,24 +147,42 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
     if sum(extent.rows for extent in extents) < least_rows:
         return None
     notes = wheel_checks.check_settings(config, document)
+    known = config
     alive, dead = faults.alive([extent.sample for extent in extents])
-    known, config = config, config.model_copy(update={"imus": tuple(config.imus[i] for i in alive)})
-    files, extents = tuple(files[i] for i in alive), tuple(extents[i] for i in alive)
+    config, files, extents = _of_imus(alive, config, files, extents)
+    kept, apart = usable.overlapping(config.imus, [(extent.first, extent.last) for extent in extents])
+    config, files, extents = _of_imus(kept, config, files, extents)
+    places = [alive[i] for i in kept]
     span = _span(files, extents)
     if _pauses(extents):
         return None  # each part is a run of its own
     until = _head_end(config, document, extents, span)
     streams = tuple(StretchReader(file).until(until, span[0]) for file in files)
-    for file, extent, index in zip(files, extents, alive, strict=True):
-        beginning = StretchReader(file).until(max(until, extent.first + CHECKED_S), extent.first)
-        notes += _checked(file, beginning, index, document)
+    beginnings = [
+        StretchReader(file).until(max(until, extent.first + CHECKED_S), extent.first)
+        for file, extent in zip(files, extents, strict=True)
+    ]
+    for file, beginning in zip(files, beginnings, strict=True):
+        notes += _checked(file, beginning)
     faults.check_distinct(streams)
+    findings = (*dead, *apart, *(finding for extent in extents for finding in extent.findings))
+    kept, fallen = usable.upright(config.imus, places, beginnings, document)
+    if fallen:
+        config, files, extents = _of_imus(kept, config, files, extents)
+        span, streams = _span(files, extents), tuple(streams[i] for i in kept)
     imus = tuple(as_mounted(entry) for entry in config.imus)
     head = loading.assemble(config, document, imus, streams, span)
     warnings = (*warnings, *notes, *head.warnings)
-    findings = (*dead, *(finding for extent in extents for finding in extent.findings))
+    findings = (*findings, *fallen)
     text = loading.in_force(known)
     return LongRecording(replace(head, warnings=warnings, findings=findings, config_text=text), files, extents, span)
+
+
+def _of_imus(
+    indices: Sequence[int], config: Config, files: Sequence[ImuFile], extents: Sequence[StreamExtent]
+) -> tuple[Config, tuple[ImuFile, ...], tuple[StreamExtent, ...]]:
+    kept = config.model_copy(update={"imus": tuple(config.imus[i] for i in indices)})
+    return kept, tuple(files[i] for i in indices), tuple(extents[i] for i in indices)
 
 
 def _pauses(extents: Sequence[StreamExtent]) -> bool:
@@ -222,13 +240,10 @@ def _span(files: Sequence[ImuFile], extents: Sequence[StreamExtent]) -> tuple[fl
     return stream_checks.check_common_span(ends, wait=any(file.entry.wheel for file in files))
 
 
-def _checked(file: ImuFile, stream: ImuStream, index: int, document: Document) -> tuple[str, ...]:
+def _checked(file: ImuFile, stream: ImuStream) -> tuple[str, ...]:
     """Check the beginning of an IMU's data; what is looked at does not depend on the axes."""
     gyro, accel, wheel = file.columns.gyro.unit, file.columns.accel.unit, file.entry.wheel
     rows = ImuRows(file.source, stream.time, stream.dtheta, stream.dvel, gyro_unit=gyro, accel_unit=accel)
     if wheel is not None:
         return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, wheel.radius_m)
-    warnings = stream_checks.check_imu(rows)
-    place = document.place(["imus", index, "axes"])
-    stream_checks.check_upright(file.entry.name, place, file.entry.axes, stream.time, stream.dvel)
-    return warnings
+    return stream_checks.check_imu(rows)
