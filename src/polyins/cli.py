@@ -343,7 +343,7 @@ def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
         _print_json(listing.document(calibration))
         return
     print_table(recording.name, listing.COLUMNS, listing.rows(calibration))
-    for warning in (*warnings, *recording.warnings, *calibration.warnings):
+    for warning in (*warnings, *recording.sentences, *calibration.warnings):
         say(f"warning: {warning}")
     say(f"forward: {calibration.forward_from}")
     say(f"configuration: {target}")

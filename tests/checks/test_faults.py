@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from polyins.checks.faults import LONGEST_REPEAT, check_alive, clipped, without_faults
+from polyins.checks.faults import LONGEST_REPEAT, alive, clipped, without_faults
 from polyins.errors import InputError
 from polyins.formats.rows import ImuRows, RowSource
 from polyins.model.recording import ImuStream
@@ -40,16 +40,19 @@ def held(of: ImuRows, begin: int, end: int) -> ImuRows:
 @given(begin=st.integers(1, 500), length=st.integers(LONGEST_REPEAT, 400))
 def test_a_frozen_chip_is_left_out_exactly_while_it_is_frozen(begin: int, length: int) -> None:
     given_rows = noisy()
-    kept, (text,) = without_faults(held(given_rows, begin, begin + length), "left", 7.0)
+    kept, (finding,) = without_faults(held(given_rows, begin, begin + length), "left", 7.0)
     np.testing.assert_array_equal(kept.time, np.delete(given_rows.time, slice(begin, begin + length)))
     first, last = given_rows.time[begin - 1] + 7.0, given_rows.time[begin + length - 1] + 7.0
-    assert text == f"a.csv: IMU left repeats the same values from {first:.3f} to {last:.3f} s; left out"
+    text = f"a.csv: IMU left repeats the same values from {first:.3f} to {last:.3f} s; {length} row(s) left out"
+    assert finding.text == text
+    assert (finding.kind, finding.stream, finding.severity) == ("left out", "left", "note")
+    assert (finding.from_s, finding.to_s, finding.size) == (pytest.approx(first), pytest.approx(last), length)
 
 
 def test_a_chip_that_freezes_again_and_again_is_named_each_time() -> None:
-    kept, texts = without_faults(held(held(noisy(), 100, 130), 400, 450), "left", 0.0)
+    kept, found = without_faults(held(held(noisy(), 100, 130), 400, 450), "left", 0.0)
     assert len(kept.time) == 1000 - 30 - 50
-    assert [text.split(" from ")[1].split(" ")[0] for text in texts] == ["100.990", "103.990"]
+    assert [finding.from_s for finding in found] == pytest.approx([100.99, 103.99])
 
 
 def test_a_few_equal_samples_are_no_fault() -> None:
@@ -62,9 +65,10 @@ def test_rows_of_zeros_are_left_out(length: int) -> None:
     given_rows = noisy()
     given_rows.dtheta[200 : 200 + length] = 0.0
     given_rows.dvel[200 : 200 + length] = 0.0
-    kept, texts = without_faults(given_rows, "left", 0.0)
+    kept, (finding,) = without_faults(given_rows, "left", 0.0)
     assert len(kept.time) == 1000 - length
-    assert "IMU left shows zeros only from 101.990" in texts[0]
+    assert "IMU left shows zeros only from 101.990" in finding.text
+    assert (finding.kind, finding.size) == ("left out", length)
 
 
 def test_a_gyro_at_exactly_zero_is_no_fault() -> None:
@@ -105,14 +109,25 @@ def test_rates_at_uneven_stamps_are_compared_as_rates() -> None:
     assert len(kept.time) == 900
 
 
-def test_one_dead_chip_among_others_is_refused_and_a_constant_recording_is_not() -> None:
-    alive, dead = (
-        ImuStream(name, one.time, one.dtheta, one.dvel) for name, one in (("a", noisy()), ("b", held(noisy(), 1, 1000)))
-    )
-    with pytest.raises(InputError, match="IMU b: shows the same values throughout"):
-        check_alive((alive, dead))
-    check_alive((dead, dead))
-    check_alive((alive, alive))
+def stream(name: str, of: ImuRows) -> ImuStream:
+    return ImuStream(name, of.time, of.dtheta, of.dvel)
+
+
+def test_one_dead_chip_among_others_is_left_out_and_a_constant_recording_is_not() -> None:
+    living, constant = stream("a", noisy()), stream("b", held(noisy(), 1, 1000))
+    zeros = stream("c", replace(noisy(), dtheta=np.zeros((1000, 3)), dvel=np.zeros((1000, 3))))
+    empty, single = (stream(name, rows(np.ones((count, 6)))) for name, count in (("d", 0), ("e", 1)))
+    kept, found = alive((constant, living, zeros, empty, single))
+    assert kept == [1]
+    assert [(one.kind, one.stream, one.severity) for one in found] == [
+        ("left out", name, "note") for name in ("b", "c", "d", "e")
+    ]
+    assert found[0].text == "IMU b shows the same values throughout; the run goes on without it"
+    assert found[2].text == "IMU d has no data; the run goes on without it"
+    assert alive((constant, constant)) == ([0, 1], ())
+    assert alive((living, living)) == ([0, 1], ())
+    with pytest.raises(InputError, match="IMU c, d: no data, or the same values throughout"):
+        alive((zeros, empty))
 
 
 @pytest.mark.parametrize(("channel", "unit", "name"), [(1, np.pi / 180.0, "gyro y"), (3, 1.0, "accelerometer x")])

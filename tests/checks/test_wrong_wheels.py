@@ -42,6 +42,17 @@ def rows_of(name: str, change: Callable[[Array], Array]) -> Spoil:
     return lambda folder, values: write_rows(folder / f"{name}.csv", change(wheel_rows(name)))
 
 
+def trembling(name: str) -> Spoil:
+    """Four seconds of a chip at rest, whose own noise tells it from a dead one and from the others."""
+
+    def at_rest(rows: Array) -> Array:
+        rows = rows[: int(4 * RATE_HZ)]
+        rows[:, 1:] += 1e-4 * np.random.default_rng(len(name)).standard_normal(rows[:, 1:].shape)
+        return rows
+
+    return rows_of(name, at_rest)
+
+
 def both(*spoils: Spoil) -> Spoil:
     return lambda folder, values: [spoil(folder, values) for spoil in spoils]
 
@@ -330,7 +341,7 @@ WARNINGS: dict[str, tuple[Spoil, str]] = {
         r"imus\[0\]\.position_m: IMU rear-right is on the middle line; is its wheel left or right of it\?",
     ),
     "no motion": (
-        both(*(rows_of(name, lambda rows: rows[: int(4 * RATE_HZ)]) for name in WHEELS)),
+        both(*map(trembling, WHEELS)),
         "imus: no wheel turns; expected a recording of a vehicle that drives",
     ),
 }

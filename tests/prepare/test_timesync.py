@@ -149,13 +149,41 @@ def test_the_warning_says_how_many_gaps_and_where_the_longest_is() -> None:
 
 def test_gaps_outside_the_common_span_are_not_spoken_of() -> None:
     early = without(regular(100.0, -5.0, 10.0), (-2.0, -1.0))
-    assert not [text for text in align((stream("a", early), stream("b", regular(100.0)))).warnings if "gap" in text]
+    aligned = align((stream("a", early), stream("b", regular(100.0))), bridge=False)
+    assert not [text for text in aligned.warnings if "gap" in text]
 
 
-def test_an_imu_that_begins_late_is_named() -> None:
-    (warning,) = align((stream("a", regular(100.0)), stream("b", regular(100.0)[150:]))).warnings
+def test_an_imu_that_begins_late_is_waited_for_where_none_stands_in_for_it() -> None:
+    aligned = align((stream("a", regular(100.0)), stream("b", regular(100.0)[150:])), bridge=False)
+    assert aligned.time[0] == 1.5
+    (warning,) = aligned.warnings
     assert "IMU b: begins at 1.5" in warning
+    assert "before is not used" in warning
     assert align((stream("a", regular(100.0)), stream("b", regular(100.0)[50:]))).warnings == ()
+
+
+@pytest.mark.parametrize("late", [0, 1, 2])
+def test_an_imu_that_begins_late_is_missing_until_then(late: int) -> None:
+    """Whichever it is, and whatever gaps the others have."""
+    full = regular(100.0)
+    times = [without(full, (3.0, 3.2)), without(full, (2.0, 2.2), (2.5, 2.7)), full]
+    times[late] = full[150:]
+    aligned = align(tuple(stream(name, time) for name, time in zip("abc", times, strict=True)))
+    np.testing.assert_allclose(aligned.time, full, atol=1e-12)
+    first = int(np.flatnonzero(~aligned.missing[:, late])[0])
+    assert first in (150, 151)
+    np.testing.assert_array_equal(aligned.missing[first:, late], False)
+    others = [i for i in range(3) if i != late]
+    mean = aligned.increments[:first, :, others].mean(axis=2)
+    np.testing.assert_allclose(aligned.increments[:first, :, late], mean, atol=1e-15)
+    assert [text for text in aligned.warnings if f"IMU {'abc'[late]}: begins at 1.500 s, 1.5 s after" in text]
+
+
+def test_a_stream_without_any_row_is_missing_throughout() -> None:
+    nothing = ImuStream("b", np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+    aligned = align((stream("a", regular(100.0)), nothing))
+    assert aligned.missing[:, 1].all()
+    np.testing.assert_array_equal(aligned.increments[:, :, 1], aligned.increments[:, :, 0])
 
 
 def test_an_imu_that_stops_early_does_not_end_the_recording() -> None:

@@ -178,12 +178,11 @@ def rounded(value: object) -> object:
     return float(f"{value:.11g}") if isinstance(value, float) else value
 
 
-def test_a_row_that_is_no_number_is_named_and_leaves_no_file(simulated, tmp_path):
+def test_an_only_imu_of_which_much_is_no_number_is_refused_with_the_row(simulated, tmp_path):
     stream = simulated.imus[1]
     dvel = stream.dvel.copy()
-    dvel[25_000, 1] = np.nan
-    broken = replace(simulated, imus=(simulated.imus[0], replace(stream, dvel=dvel), simulated.imus[2]))
-    config = files.write(broken, tmp_path / "recording")
+    dvel[25_000:, 1] = np.nan
+    config = files.write(replace(simulated.subset([1]), imus=(replace(stream, dvel=dvel),)), tmp_path / "recording")
     with pytest.raises(InputError, match=r"imu2.parquet, row 25001: accel is missing"):
         opened(config)
 
@@ -201,7 +200,7 @@ def test_rows_that_a_chip_repeats_are_left_out_as_in_memory(simulated, tmp_path,
     solution = pi.run(recording)
     write_solution(solution, tmp_path / "whole")
     long = opened(config)
-    assert sum("repeats the same values" in warning for warning in long.head.warnings) >= 2
+    assert sum("repeats the same values" in warning for warning in long.head.sentences) >= 2
     navigation.run(long, folders={tmp_path / "parts": None}, stretch_s=13.7)
     same(tmp_path / "whole", tmp_path / "parts")
 
@@ -218,15 +217,23 @@ def test_a_start_late_in_the_recording_is_found(simulated, tmp_path, monkeypatch
         opened(config)
 
 
-def test_stamps_that_go_back_are_refused_before_anything_runs(simulated, tmp_path):
+def test_rows_that_are_no_data_are_left_out_as_in_memory(simulated, tmp_path, monkeypatch):
+    """NaN, stamps that leap and go back, and values no sensor has, at the edges of pieces, too."""
     stream = simulated.imus[2]
-    time = stream.time.copy()
+    time, dtheta, dvel = stream.time.copy(), stream.dtheta.copy(), stream.dvel.copy()
+    dvel[16_380:16_390, 1] = np.nan
     time[20_000] = time[19_000]
-    config = files.write(
-        replace(simulated, imus=(*simulated.imus[:2], replace(stream, time=time))), tmp_path / "recording"
-    )
-    with pytest.raises(InputError, match=r"imu3.parquet, row 20001: .*expected increasing times"):
-        opened(config)
+    time[22_000] += 1000.0
+    dtheta[25_000, 2] = 1e30
+    sick = replace(stream, time=time, dtheta=dtheta, dvel=dvel)
+    config = files.write(replace(simulated, imus=(*simulated.imus[:2], sick)), tmp_path / "recording")
+    monkeypatch.setattr(columns, "PIECE_ROWS", 16_384)
+    recording = pi.load(config)
+    assert len(recording.imus[2].time) == len(time) - 13
+    assert [(one.kind, one.size) for one in recording.findings] == [("left out", size) for size in (10, 1, 1, 1)]
+    write_solution(pi.run(recording), tmp_path / "whole")
+    navigation.run(opened(config), folders={tmp_path / "parts": None}, stretch_s=13.7)
+    same(tmp_path / "whole", tmp_path / "parts")
 
 
 def test_only_large_recordings_are_taken_in_stretches_and_none_whose_rows_are_repaired(simulated, tmp_path):

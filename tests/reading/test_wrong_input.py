@@ -54,7 +54,21 @@ def rows_of_gnss(change: Callable[[np.ndarray], np.ndarray]) -> Spoil:
     return lambda folder, values: (write_rows(folder / "gnss.txt", change(fixes())), None)[1]
 
 
-def at(row: int, column: int, value: float) -> Callable[[np.ndarray], np.ndarray]:
+def alone(index: int, spoil: Spoil) -> Spoil:
+    """Spoil the file of one IMU, which there is no other beside."""
+
+    def spoil_it(folder: Path, values: Values) -> None:
+        spoil(folder, values)
+        values["imus"] = [values["imus"][index]]
+
+    return spoil_it
+
+
+ON = slice(11, None)
+"""rows from the twelfth on"""
+
+
+def at(row: int | slice, column: int, value: float) -> Callable[[np.ndarray], np.ndarray]:
     def change(rows: np.ndarray) -> np.ndarray:
         rows[row, column] = value
         return rows
@@ -127,12 +141,32 @@ def on_its_side(rows: np.ndarray) -> np.ndarray:
 
 
 def swapped(rows: np.ndarray) -> np.ndarray:
-    rows[[7, 8]] = rows[[8, 7]]
+    """Each two rows from the eighth on in the wrong order."""
+    pairs = np.arange(7, len(rows) - 1, 2)
+    rows[np.ravel([pairs, pairs + 1])] = rows[np.ravel([pairs + 1, pairs])]
+    return rows
+
+
+def coarse(rows: np.ndarray) -> np.ndarray:
+    """Stamps of a clock that ticks slower than the IMU."""
+    rows[:, 0] = np.floor(rows[:, 0] * 10.0 + 1e-6) / 10.0
+    return rows
+
+
+def lost(rows: np.ndarray) -> np.ndarray:
+    rows[[100, 200], 2] = np.nan
+    rows[300, 0] = rows[299, 0]
+    rows[400, 4] = 1e30
+    return rows
+
+
+def turn_of_three(rows: np.ndarray) -> np.ndarray:
+    rows[:, 1] = np.linspace(3.1, 3.0, len(rows))
     return rows
 
 
 def degrees_of_a_turn(rows: np.ndarray) -> np.ndarray:
-    rows[:, 1:4] = np.degrees(1.2)
+    rows[:, 1:4] = np.degrees(1.2) + rows[:, 1:4]
     return rows
 
 
@@ -143,7 +177,7 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     "empty file": (content("a.txt", b""), r"a\.txt", "is empty; expected data"),
     "blank file": (content("b.csv", b"\n \n"), r"b\.csv", "is empty; expected data"),
     "header only": (content("b.csv", b"t,gx,gy,gz,ax,ay,az\n"), r"b\.csv", "no rows; expected data"),
-    "one row": (rows_of_a(lambda rows: rows[:1]), r"a\.txt", r"1 row\(s\); expected at least 2"),
+    "one row": (alone(0, rows_of_a(lambda rows: rows[:1])), r"a\.txt", r"1 row\(s\); expected at least 2"),
     "not gzip": (packed_wrongly, r"a\.txt\.gz", "expected a whole gzip file"),
     "cut gzip": (packed_and_cut, r"a\.txt\.gz", "expected a whole gzip file"),
     "cut binary": (binary_cut, r"a\.txt", "expected a multiple of 56"),
@@ -171,12 +205,12 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     ),
     "column number": (columns("time", "name", to=9), r"b\.csv: no column 9", "expected a number from 1 to 7"),
     # stamps
-    "unsorted": (rows_of_a(swapped), r"a\.txt, line 9: time 100\.14", "expected increasing times"),
-    "repeated": (rows_of_a(at(4, 0, 100.06)), r"a\.txt, line 5: time 100\.06\d* s is repeated \(1", "rate_hz"),
-    "repeated in a table": (rows_of_b(at(4, 0, 100.06)), r"b\.csv, line 6: time", "expected increasing times"),
-    "NaN": (rows_of_a(at(11, 2, np.nan)), r"a\.txt, line 12: gyro is missing", "expected a number"),
-    "NaN in a table": (rows_of_b(at(11, 6, np.nan)), r"b\.csv, line 13: accel is missing", "expected a number"),
-    "NaN time": (rows_of_b(at(3, 0, np.nan)), r"b\.csv, line 5: time is missing", "expected a number"),
+    "unsorted": (alone(0, rows_of_a(swapped)), r"a\.txt, line 9: time 100\.14", "expected increasing times"),
+    "repeated": (alone(0, rows_of_a(coarse)), r"a\.txt, line 2: time 100\.0* s is repeated", "rate_hz"),
+    "repeated in a table": (alone(1, rows_of_b(coarse)), r"b\.csv, line 3: time", "expected increasing times"),
+    "NaN": (alone(0, rows_of_a(at(ON, 2, np.nan))), r"a\.txt, line 12: gyro is missing", "expected a number"),
+    "NaN in a table": (alone(1, rows_of_b(at(ON, 6, np.nan))), r"b\.csv, line 13: accel is missing", "a number"),
+    "NaN time": (alone(1, rows_of_b(at(ON, 0, np.nan))), r"b\.csv, line 13: time is missing", "expected a number"),
     "time unit": (columns("time", "unit", to="us"), r"b\.csv", "is the unit of time"),
     "short": (
         lambda folder, values: (
@@ -203,7 +237,7 @@ CASES: dict[str, tuple[Spoil, str, str]] = {
     "m/s^2 as g": (columns("accel", "unit", to="g"), r"b\.csv", r"say unit: m/s\^2"),
     "no gravity": (rows_of_b(scaled(slice(4, 7), 0.01)), r"b\.csv", "gravity was taken out"),
     "degrees as radians": (rows_of_b(degrees_of_a_turn), r"b\.csv, line \d+", "is the unit deg/s?"),
-    "degrees as increments": (rows_of_a(at(5, 1, 3.0)), r"a\.txt, line 6", "expected at most 2 rad"),
+    "degrees as increments": (rows_of_a(turn_of_three), r"a\.txt, line 2", "expected at most 2 rad"),
     # axes
     "upside down": (rows_of_a(upside_down), r"imus\[0\]\.axes: IMU a", r"Try axes: \[x, -y, -z\]"),
     "on its side": (rows_of_b(on_its_side), r"imus\[1\]\.axes: IMU b", r"Try axes: \[x, -z, y\]"),
@@ -434,6 +468,19 @@ def test_command_line_says_it_in_two_lines_and_exits_with_2(
 
 def test_the_recording_that_the_cases_spoil_loads_without_a_word(tmp_path: Path) -> None:
     assert load(write_config(tmp_path, write_recording(tmp_path))).warnings == ()
+
+
+@pytest.mark.parametrize("spoil", [alone(1, rows_of_b(lost)), rows_of_b(lost)])
+def test_single_rows_that_are_no_data_are_left_out_and_named(spoil: Spoil, tmp_path: Path) -> None:
+    values = write_recording(tmp_path)
+    spoil(tmp_path, values)
+    recording = load(write_config(tmp_path, values))
+    assert [(one.kind, one.stream, one.size, one.severity) for one in recording.findings] == [
+        ("left out", "b", 1, "note")
+    ] * 4
+    expected = ("are not all numbers", "are not all numbers", "are repeated, go back or leap", "beyond the range")
+    assert all(text in one.text for text, one in zip(expected, recording.findings, strict=True))
+    np.testing.assert_allclose(recording.imus[-1].time, np.delete(still_imu()[:, 0], [100, 200, 300, 400]), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

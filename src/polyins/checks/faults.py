@@ -11,8 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.checks.no_data import left_out
 from polyins.errors import InputError
 from polyins.formats.rows import ImuRows, intervals, without
+from polyins.model.findings import LEFT_OUT, Finding
 from polyins.model.recording import Array, ImuStream
 
 LONGEST_REPEAT = 10
@@ -32,22 +34,56 @@ LEAST_STEPS = 10.0
 NAMES = ("gyro x", "gyro y", "gyro z", "accelerometer x", "accelerometer y", "accelerometer z")
 
 
-def without_faults(rows: ImuRows, name: str, clock_offset: float) -> tuple[ImuRows, tuple[str, ...]]:
-    """Leave out the rows that the chip did not measure; returns warnings that name the IMU and the spans.
+def without_faults(rows: ImuRows, name: str, clock_offset: float) -> tuple[ImuRows, tuple[Finding, ...]]:
+    """Leave out the rows that the chip did not measure; returns findings that name the IMU and the spans.
 
-    `clock_offset`, s, puts the stamps in the warnings on the recording's clock.
+    `clock_offset`, s, puts the stamps in them on the recording's clock.
     """
     if len(rows.time) < 2:
         return rows, ()
-    time = rows.time + clock_offset
-    found = {"shows zeros only": _zeros(rows), "repeats the same values": _frozen(rows)}
-    texts = [
-        f"{rows.source.path}: IMU {name} {what} from {begin:.3f} to {end:.3f} s; left out"
-        for what, bad in found.items()
-        for begin, end in _spans(time, bad)
-    ]
-    bad = np.logical_or(*found.values())
-    return (without(rows, bad) if bad.any() else rows), tuple(texts)
+    time, place = rows.time + clock_offset, f"{rows.source.path}: IMU {name}"
+    zeros, frozen = _zeros(rows), _frozen(rows)
+    found = (
+        *left_out("zeros", place, time, zeros, name),
+        *left_out("frozen", place, time, frozen & ~zeros, name),
+    )
+    bad = zeros | frozen
+    return (without(rows, bad) if bad.any() else rows), found
+
+
+def alive(streams: Sequence[ImuStream]) -> tuple[list[int], tuple[Finding, ...]]:
+    """Return the indices of the IMUs that show something, and findings of those that a run goes on without.
+
+    One that shows the same values throughout is dead if another one does not: without noise all may, at rest. Raises
+    InputError if none shows anything.
+    """
+    there = [not _is_constant(stream) for stream in streams]
+    if not any(there):
+        there = [len(stream.time) > 1 and bool(stream.dvel.any()) for stream in streams]
+    if not any(there):
+        names = ", ".join(stream.name for stream in streams)
+        raise InputError(f"IMU {names}: no data, or the same values throughout; expected one that measures")
+    kept = [i for i, one in enumerate(there) if one]
+    return kept, tuple(_dead(stream) for stream, one in zip(streams, there, strict=True) if not one)
+
+
+def _is_constant(stream: ImuStream) -> bool:
+    values = np.hstack([stream.dtheta, stream.dvel]) / np.maximum(intervals(stream.time), np.finfo(float).tiny)[:, None]
+    return len(values) < 2 or not _changes(values)[1:].any()
+
+
+def _dead(stream: ImuStream) -> Finding:
+    why = "has no data" if len(stream.time) < 2 else "shows the same values throughout"
+    span = (float(stream.time[0]), float(stream.time[-1])) if len(stream.time) else (None, None)
+    return Finding(
+        LEFT_OUT,
+        f"IMU {stream.name} {why}; the run goes on without it",
+        stream=stream.name,
+        from_s=span[0],
+        to_s=span[1],
+        size=why,
+        remedy="look at its cable, its supply and its file",
+    )
 
 
 def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) -> tuple[str, ...]:
@@ -76,14 +112,6 @@ def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) ->
             f"range?{remedy}"
         )
     return tuple(texts)
-
-
-def check_alive(streams: Sequence[ImuStream]) -> None:
-    """Raise InputError if one IMU shows the same values throughout and another one does not."""
-    spread = [np.ptp(np.hstack([stream.dtheta, stream.dvel]), axis=0).max() for stream in streams]
-    dead = int(np.argmin(spread))
-    if spread[dead] == 0.0 < max(spread):
-        raise InputError(f"IMU {streams[dead].name}: shows the same values throughout; expected one that measures")
 
 
 def check_distinct(streams: Sequence[ImuStream]) -> None:
@@ -149,7 +177,3 @@ def _runs(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first row and the one after the last of each stretch in which `where` holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
     return [(int(begin), int(end)) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _spans(time: Array, bad: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    return [(float(time[max(begin - 1, 0)]), float(time[end - 1])) for begin, end in _runs(bad)]

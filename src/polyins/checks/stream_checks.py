@@ -12,17 +12,18 @@ from polyins.formats.rows import ImuRows, RowSource, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
 from polyins.model.recording import Array, usual_interval
 from polyins.model.rig import STANDARD_GRAVITY
-from polyins.prepare.timesync import common_end
+from polyins.prepare.plausible import BODY, WHEEL
+from polyins.prepare.timesync import LEAST_COMMON, common_begin, common_end, least_common
 
 Axes = tuple[str, str, str]
 
 GRAVITY_M_S2 = (5.0, 15.0)
 """The median size of the specific force lies between these on any vehicle."""
 MAX_TURN_RAD = 2.0
-MAX_RATE_RAD_S = 10.0
+MAX_RATE_RAD_S = BODY.rms_rate
 """rms over a recording, of anything but a wheel"""
 UNUSUAL_RATE_RAD_S = 3.0
-WHEEL_RATE_RAD_S = 100.0
+WHEEL_RATE_RAD_S = WHEEL.rms_rate
 """rms over a recording, of a wheel"""
 FARTHEST_OFF_AXIS_M = 1.0
 """what a sensor of unknown mount may be off the axis of a wheel"""
@@ -33,7 +34,6 @@ step is taken for all of it; from `timesync.GAP` intervals on a gap is bridged."
 JITTER = 0.2
 UPRIGHT = 0.5
 """Cosine of the largest angle between up in the array and the mean specific force."""
-MIN_COMMON_S = 2.0
 MAX_STD_M = 10000.0
 MOST_OF_A_WEEK_S = 600000.0
 
@@ -46,10 +46,7 @@ def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m:
     Raises InputError for fewer than two rows, NaN, stamps that do not increase, and values whose size shows a wrong
     unit.
     """
-    if len(rows.time) < 2:
-        raise InputError(f"{rows.source.path}: {len(rows.time)} row(s); expected at least 2")
-    check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel})
-    check_order(rows.source, rows.time, "; give rate_hz if the file's stamps are wrong and its rows are not")
+    check_rows(rows)
     _check_rate(rows)
     _check_accel_unit(rows, off_axis_m)
     rate = _check_gyro_unit(rows, max_rate_rad_s)
@@ -59,15 +56,24 @@ def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m:
     return (*rows.warnings, *(f"{rows.source.path}: {text}" for text in texts))
 
 
-def check_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> None:
-    """Raise InputError if the mean specific force in array axes does not point up, with axes that would make it so.
+def check_rows(rows: ImuRows, first_row: int = 0) -> None:
+    """Raise InputError for fewer than two rows, NaN, and stamps that do not increase; `first_row`: where they begin."""
+    if len(rows.time) < 2:
+        raise InputError(f"{rows.source.path}: {len(rows.time)} row(s); expected at least 2")
+    check_finite(rows.source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel}, first_row)
+    remedy = "; give rate_hz if the file's stamps are wrong and its rows are not"
+    check_order(rows.source, rows.time, remedy, first_row)
+
+
+def off_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> str:
+    """Say that the mean specific force in array axes does not point up, with axes that would make it so; or nothing.
 
     `dvel`: m/s in array axes (forward, right, down), shape (T, 3); `axes` as configured.
     """
     force = dvel[1:].sum(axis=0) / (time[-1] - time[0])
     if -force[2] >= UPRIGHT * np.linalg.norm(force):
-        return
-    raise InputError(
+        return ""
+    return (
         f"{place}: IMU {name}: with axes [{', '.join(axes)}] the mean specific force is "
         f"[{', '.join(f'{f:.1f}' for f in force)}] m/s^2 forward, right, down; expected about [0, 0, -9.8]. "
         f"Try axes: [{', '.join(upright_axes(axes, force))}]"
@@ -122,21 +128,22 @@ def check_std(source: RowSource, std: Array) -> None:
         raise InputError(f"{source.place(int(row))}: position std is {std[row].tolist()} m; expected metres")
 
 
-def check_common_span(spans: dict[str, tuple[float, float]]) -> tuple[float, float]:
-    """Return the span of the recording, s; raise InputError if all IMUs have less than 2 s in common.
+def check_common_span(spans: dict[str, tuple[float, float]], *, wait: bool) -> tuple[float, float]:
+    """Return the span of the recording, s; raise InputError if an IMU has less than 2 s in common with the others.
 
-    It begins when all measure. One that stops long before the others does not end it.
+    With `wait` it begins when all measure; otherwise one that begins long after the others does not hold it up. One
+    that stops long before the others does not end it.
     """
-    latest = max(spans, key=lambda name: spans[name][0])
-    earliest = min(spans, key=lambda name: spans[name][1])
-    begin, end = spans[latest][0], spans[earliest][1]
-    if end - begin >= MIN_COMMON_S:
-        return begin, common_end(np.array([span[1] for span in spans.values()]))
+    begins, ends = np.array(list(spans.values())).T
+    least = least_common(begins, ends, wait=wait)
+    if least >= LEAST_COMMON:
+        return float(begins.max()) if wait else common_begin(begins), common_end(ends)
+    latest, earliest = list(spans)[int(np.argmax(begins))], list(spans)[int(np.argmin(ends))]
     if latest == earliest:
-        raise InputError(f"IMU {latest}: {end - begin:.3f} s of data; expected at least {MIN_COMMON_S:g} s")
+        raise InputError(f"IMU {latest}: {least:.3f} s of data; expected at least {LEAST_COMMON:g} s")
     raise InputError(
-        f"IMU {latest} begins at {begin:.3f} s and IMU {earliest} ends at {end:.3f} s; expected at least "
-        f"{MIN_COMMON_S:g} s in common (clock_offset_s shifts a clock)"
+        f"IMU {latest} begins at {begins.max():.3f} s and IMU {earliest} ends at {ends.min():.3f} s; expected at least "
+        f"{LEAST_COMMON:g} s in common (clock_offset_s shifts a clock)"
     )
 
 

@@ -28,7 +28,7 @@ from polyins.evaluation.figures import Figures
 from polyins.evaluation.outages import Interval, outage_statistic
 from polyins.evaluation.verdict import coverage, verdict
 from polyins.formats.documents import plain
-from polyins.model.findings import LEVELS, Finding
+from polyins.model.findings import LEFT_OUT, LEVELS, Finding
 from polyins.model.methods import METHODS
 from polyins.model.recording import Reference
 from polyins.model.solution import Innovations, Solution
@@ -78,7 +78,11 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
         "start": solution.start,
         "verdict": judged.document(),
         "coverage": coverage(solution, figures.epochs),
-        "exclusions": [],
+        "exclusions": [
+            {"imu": one.stream, "from_s": one.from_s, "to_s": one.to_s, "cause": one.text, "statistic": None}
+            for one in judged.findings
+            if one.kind == LEFT_OUT
+        ],
         "faults": judged.faults,
         "mounting": _mounting(solution),
         "warnings": judged.warnings,

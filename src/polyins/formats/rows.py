@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.model.recording import Array, usual_interval
+from polyins.model.recording import USUAL_OF, Array
 from polyins.prepare.timesync import GAP
 
 
@@ -87,24 +87,31 @@ LONGEST_BRIDGE = 3
 def without(rows: ImuRows, bad: NDArray[np.bool_]) -> ImuRows:
     """Leave out the rows in `bad`, shape (T,).
 
-    After a hole of up to 3 rows the next row's rates are taken for the whole time since the row before the hole; longer
-    holes are gaps.
+    After a hole of up to 3 rows the next row's rates are taken for the whole time since the row before the hole, or as
+    often as there are rows where the stamp before it is wrong; longer holes are gaps.
     """
     kept = np.flatnonzero(~bad)
     holes = np.diff(kept, prepend=kept[:1] - 1) - 1
     bridged = (holes > 0) & (holes <= LONGEST_BRIDGE) & (np.arange(len(kept)) > 0)
     own, time = intervals(rows.time)[kept], rows.time[kept]
-    factor = np.where(bridged, np.diff(time, prepend=time[:1]) / own, 1.0)[:, None]
+    with np.errstate(invalid="ignore", over="ignore"):
+        known = np.diff(rows.time, prepend=np.nan)[kept] == own
+    times = np.where(known, np.diff(time, prepend=time[:1]) / own, holes + 1.0)
+    factor = np.where(bridged, times, 1.0)[:, None]
     return replace(rows, time=time, dtheta=rows.dtheta[kept] * factor, dvel=rows.dvel[kept] * factor)
 
 
 def intervals(time: Array) -> Array:
     """Return the length of the interval that ends at each stamp, s.
 
-    The first is taken to be the usual one, and so is that after a gap: what a rate was in it is not known.
+    The first is taken to be the usual one, and so is that after a gap or a stamp that is out of order or no number:
+    what a rate was in it is not known.
     """
-    steps = np.diff(time)
-    if not len(steps):
+    if len(time) < 2:
         return np.zeros(len(time))
-    usual = usual_interval(time)
-    return np.concatenate([[usual], np.where(steps > GAP * usual, usual, steps)])
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(time)
+    steps[~np.isfinite(steps)] = 0.0
+    known = steps[:USUAL_OF][steps[:USUAL_OF] > 0.0]
+    usual = float(np.median(known)) if len(known) else 0.0
+    return np.concatenate([[usual], np.where((steps > 0.0) & (steps <= GAP * usual), steps, usual)])

@@ -239,7 +239,7 @@ def _recording(options: Options, config: Config, document: Document) -> tuple[Re
     """Return the recording to be replayed, or one without streams; and warnings."""
     if REPLAY in options.sources:
         recording = loading.build(config, document)
-        return recording, recording.warnings
+        return recording, recording.sentences
     return loading.without_data(config, document)
 
 

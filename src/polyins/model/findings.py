@@ -17,6 +17,8 @@ LEVELS: tuple[Level, ...] = (TRUST, DOUBT, DO_NOT_USE)
 
 SILENT = "silent"
 """kind of the finding that an IMU gave no data for a while, which the others bridged"""
+LEFT_OUT = "left out"
+"""kind of the finding that a run goes on without an IMU, for a while or throughout"""
 
 
 @dataclass(frozen=True)

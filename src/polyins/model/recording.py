@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.model.findings import Finding
 from polyins.model.rig import DEG, Rig, Vector, zero_vector
 
 Array = NDArray[np.float64]
@@ -229,10 +230,17 @@ class Recording:
     config_text: str = ""
     """the configuration in force, as YAML"""
     warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    """what of the IMUs' data is left out"""
     clock_offsets: tuple[Offset, ...] = ()
     """what was found where the configuration says `time_offset: estimate`"""
     aiding: tuple[AidingStream, ...] = ()
     """what sensors beside IMUs and GNSS say"""
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Warnings and findings."""
+        return (*self.warnings, *(finding.sentence for finding in self.findings))
 
     def without_gate(self) -> Recording:
         """Return the recording with every measurement taken as it is, as the papers do."""

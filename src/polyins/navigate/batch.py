@@ -318,6 +318,7 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         recording_span=_span(recording),
         findings=(
             *notes(recording.warnings),
+            *recording.findings,
             *aligned.findings,
             *(silences(run.choice, recording, aligned) if recording.rig.has_wheels else ()),
         ),

@@ -464,8 +464,10 @@ class _Search:
         """Take what the gyros show at a standstill, less the earth's rate, as their biases."""
         rate, _, duration = self._mean(*still)
         rate = rate - rotation_matrix(attitude).T @ earth_rate(position, self.recording.geodetic)
-        self.errors[:, :3] += rate
-        for i, imu in enumerate(self.recording.rig.imus):
+        there = ~self.aligned.between(*still).missing[1:].all(axis=0)
+        self.errors[there, :3] += rate[there]
+        for i in np.flatnonzero(there):
+            imu = self.recording.rig.imus[i]
             # white noise over the standstill, and a tenth of the grade for what the bias does afterwards
             self.error_std[i, :3] = np.hypot(
                 imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std

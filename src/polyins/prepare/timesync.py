@@ -15,7 +15,9 @@ from polyins.model.recording import ImuStream, usual_interval
 Array = NDArray[np.float64]
 
 LATE = 1.0
-"""s: an IMU that begins so long after the others is waited for, one that ends so long before them is not"""
+"""s: an IMU that begins so long after the others or ends so long before them is not waited for"""
+LEAST_COMMON = 2.0
+"""s that each IMU has in common with another one"""
 
 GAP = 3.5
 """An interval longer than this many nominal ones is a gap: what was measured in it is lost."""
@@ -55,6 +57,8 @@ class Whole:
     """What is known of whole streams, parts of which are aligned."""
 
     gap_counts: tuple[int, ...]
+    begins: Array
+    """first stamp of each, s, shape (N,); infinite without any"""
     ends: Array
     """last stamp of each, s, shape (N,)"""
     intervals: Array
@@ -63,19 +67,21 @@ class Whole:
     @classmethod
     def of(cls, streams: tuple[ImuStream, ...]) -> Whole:
         """Look at streams that are whole."""
-        intervals = np.array([usual_interval(stream.time) for stream in streams])
+        intervals = np.array([usual_interval(one.time) if len(one.time) > 1 else np.nan for one in streams])
+        intervals[np.isnan(intervals)] = np.nanmedian(intervals)
         gaps = (gaps_of(stream.time, usual) for stream, usual in zip(streams, intervals, strict=True))
-        return cls(tuple(map(len, gaps)), np.array([stream.time[-1] for stream in streams]), intervals)
-
-    @property
-    def end(self) -> float:
-        """Where the recording ends, s."""
-        return common_end(self.ends)
+        begins = np.array([one.time[0] if len(one.time) else np.inf for one in streams])
+        ends = np.array([one.time[-1] if len(one.time) else -np.inf for one in streams])
+        return cls(tuple(map(len, gaps)), begins, ends, intervals)
 
     @property
     def order(self) -> list[int]:
         """In which their stamps become those of all: a gap in the first one's is one for all."""
-        return sorted(range(len(self.ends)), key=lambda i: (self.gap_counts[i], self.ends[i] < self.end))
+        begin, end = common_begin(self.begins), common_end(self.ends)
+        return sorted(
+            range(len(self.ends)),
+            key=lambda i: (self.gap_counts[i] + (self.begins[i] > begin), self.ends[i] < end),
+        )
 
 
 def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | None = None) -> Aligned:
@@ -83,18 +89,18 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | No
 
     The increments of the others are shared out between its intervals, so that no rotation or velocity is lost or
     counted twice. Where one IMU has a gap, it is given the mean of those that have none there; where all have one,
-    the mean of the rates on both sides; without `bridge` the gap is left empty. Any gap is a warning. `whole`: of
-    longer streams, whose parts these are; a part is empty of a stream that has ended. Raises InputError if less than
-    two seconds are common.
+    the mean of the rates on both sides; without `bridge` the gap is left empty, and the time begins when all have
+    begun. Any gap is a warning. `whole`: of longer streams, whose parts these are; a part is empty of a stream that has
+    ended or not begun. Raises InputError if less than two seconds are common.
     """
     if whole is None:
         whole = Whole.of(streams)
-        _check_common(streams, whole.end)
+        _check_common(whole, streams, wait=not bridge)
     gaps_by_stream = [gaps_of(*of) for of in zip((stream.time for stream in streams), whole.intervals, strict=True)]
-    time = _common_time(streams, whole)
+    time = _common_time(streams, whole, wait=not bridge)
     on_base: list[tuple[Array, Array]] = []
     missing = np.zeros((len(time), len(streams)), dtype=bool)
-    findings = late_beginnings(streams)
+    findings = late_beginnings([stream.name for stream in streams], whole.begins, wait=not bridge)
     for i, (stream, known) in enumerate(zip(streams, gaps_by_stream, strict=True)):
         if not stream.time.size:
             on_base.append((np.zeros((len(time), 3)), np.zeros((len(time), 3))))
@@ -104,7 +110,8 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | No
             values = _resample(stream, time, float(whole.intervals[i]))
             on_base.append((values[:, :3], values[:, 3:]))
         gaps = [g for g in known if g[1] > time[0] and g[0] < time[-1]]
-        stops = float(whole.ends[i])
+        begins, stops = float(whole.begins[i]), max(float(whole.ends[i]), time[0])
+        missing[: np.searchsorted(time, begins) + 1 if begins - time[0] > LATE else 0, i] = True
         if time[-1] - stops > LATE:
             gaps.append((stops, float(time[-1])))
         for begin, end in gaps:
@@ -120,19 +127,25 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | No
     return Aligned(time, increments, tuple(findings), missing)
 
 
-def late_beginnings(streams: tuple[ImuStream, ...]) -> list[Finding]:
-    """Say which IMU the others have to wait for."""
-    begins = np.array([stream.time[0] if stream.time.size else -np.inf for stream in streams])
-    latest = int(np.argmax(begins))
-    wait = float(begins[latest] - begins.min())
-    if not LATE < wait < np.inf:
-        return []
-    name, begin = streams[latest].name, float(begins[latest])
-    text = (
-        f"IMU {name}: begins at {begin:.3f} s, {wait:.1f} s after the first one; what the others measured before is not"
-        " used"
-    )
-    return [Finding("late begin", text, stream=name, from_s=begin - wait, to_s=begin, size=wait)]
+def late_beginnings(names: Sequence[str], begins: Array, *, wait: bool) -> list[Finding]:
+    """Say which IMUs begin late; with `wait` the others have to wait for the last one, whose measurements count then.
+
+    `begins`: first stamp of each, s, shape (N,), infinite without any.
+    """
+    first, latest = float(begins.min()), int(np.argmax(begins))
+    late = [latest] if wait else range(len(names))
+    return [_late(names[i], float(begins[i]), first, wait) for i in late if LATE < begins[i] - first < np.inf]
+
+
+def _late(name: str, begin: float, first: float, wait: bool) -> Finding:
+    after = f"IMU {name}: begins at {begin:.3f} s, {begin - first:.1f} s after the first one; "
+    text = after + ("what the others measured before is not used" if wait else "the others go on without it until then")
+    return Finding("late begin", text, stream=name, from_s=first, to_s=begin, size=begin - first)
+
+
+def common_begin(begins: Array) -> float:
+    """Return when a recording begins whose streams begin then, s; one that begins long after others has a gap."""
+    return float(begins[begins < begins.min() + LATE].max())
 
 
 def common_end(ends: Array) -> float:
@@ -154,20 +167,34 @@ def _interleaved(streams: Sequence[tuple[Array, Array]], epochs: int) -> Array:
     return increments
 
 
-def _check_common(streams: tuple[ImuStream, ...], end: float) -> None:
-    begin = max(stream.time[0] for stream in streams)
-    if min(end, *(stream.time[-1] for stream in streams)) - begin < 2.0:
-        spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams)
+def least_common(begins: Array, ends: Array, *, wait: bool) -> float:
+    """Return how long all IMUs measure together, s; without `wait`, each with the one that overlaps it most.
+
+    `begins`, `ends`: shape (N,), s.
+    """
+    if wait or len(begins) == 1:
+        return float(ends.min() - begins.max())
+    together = np.minimum.outer(ends, ends) - np.maximum.outer(begins, begins)
+    np.fill_diagonal(together, -np.inf)
+    return float(together.max(axis=1).min())
+
+
+def _check_common(whole: Whole, streams: tuple[ImuStream, ...], *, wait: bool) -> None:
+    there = np.isfinite(whole.begins)
+    if least_common(whole.begins[there], whole.ends[there], wait=wait) < LEAST_COMMON:
+        spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams if len(s.time))
         raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
 
 
-def _common_time(streams: tuple[ImuStream, ...], whole: Whole) -> Array:
+def _common_time(streams: tuple[ImuStream, ...], whole: Whole, *, wait: bool) -> Array:
     """Return the stamps of the stream with the fewest gaps, filled up in them with those of others.
 
-    The time goes on where a stream ends for good while others go on.
+    The time goes on where a stream ends for good while others go on; it begins with the first ones, or with `wait` when
+    all have begun.
     """
     there = [stream for stream in streams if stream.time.size]
-    begin = max(stream.time[0] for stream in there)
+    begins = np.array([stream.time[0] for stream in there])
+    begin = float(begins.max()) if wait else common_begin(begins)
     end = common_end(np.array([stream.time[-1] for stream in there]))
     ordered = [streams[i] for i in whole.order]
     base: Array = ordered[0].time[(ordered[0].time >= begin) & (ordered[0].time <= end)]
@@ -185,10 +212,12 @@ def _common_time(streams: tuple[ImuStream, ...], whole: Whole) -> Array:
 
 
 def _empty_until(base: Array, begin: float, end: float, nominal: float) -> list[tuple[float, float]]:
-    """Return the gaps of a clock, and what it lacks until the end: all, from the beginning, if it has ended before."""
+    """Return the gaps of a clock, and what it lacks at the beginning and until the end: all, if it is not there."""
     if not base.size:
         return [(begin - nominal, end + nominal)]
-    return [*gaps_of(base, nominal), *([(float(base[-1]), end + nominal)] if end - base[-1] > GAP * nominal else [])]
+    before = [(begin - nominal, float(base[0]))] if base[0] - begin > GAP * nominal else []
+    after = [(float(base[-1]), end + nominal)] if end - base[-1] > GAP * nominal else []
+    return [*before, *gaps_of(base, nominal), *after]
 
 
 def _resample(stream: ImuStream, time: Array, usual: float) -> Array:

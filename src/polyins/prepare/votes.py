@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.model.findings import Finding
 from polyins.model.rig import DEG, Rig
+from polyins.prepare import mounts
 from polyins.prepare.timesync import Aligned
 
 Array = NDArray[np.float64]
@@ -45,7 +47,23 @@ def disagreements(rig: Rig, aligned: Aligned) -> tuple[Finding, ...]:
     middle = np.median(mean, axis=2, keepdims=True)
     allowed = SIGMAS * _std(rig, middle[:, :, 0]) + _unmodelled(middle[:, :, 0])[:, :, None]
     over = np.where(whole[:, None, :], np.abs(mean - middle) / allowed, 0.0)
-    return (*_unequal(rig), *_found(rig, mean - middle, over, edges))
+    found: Iterable[Finding] = _found(rig, mean - middle, over, edges)
+    if count > 2:
+        found = (_mount_of(rig, aligned, finding) or finding for finding in found)
+    return (*_unequal(rig), *found)
+
+
+def _mount_of(rig: Rig, aligned: Aligned, finding: Finding) -> Finding | None:
+    """Return the finding that other axes explain why an IMU differs, with the time that it does."""
+    index = next(i for i, imu in enumerate(rig.imus) if imu.name == finding.stream)
+    length = max(2, round(mounts.WINDOW * aligned.rate_hz))
+    used = slice(1, 1 + (len(aligned.time) - 1) // length * length)
+    there = np.asarray(~aligned.missing[used].any(axis=1).reshape(-1, length).any(axis=1))
+    steps = np.diff(aligned.time[::length][: len(there) + 1])[there, None, None]
+    rates = aligned.increments[used].reshape(-1, length, 6, len(rig.imus)).sum(axis=1)[there] / steps
+    others = np.median(np.delete(rates, index, axis=2), axis=2)
+    named = mounts.mount(rig.imus[index], rates[:, :, index], others) if len(rates) > 1 else None
+    return named and replace(named, from_s=finding.from_s, to_s=finding.to_s)
 
 
 def _std(rig: Rig, middle: Array) -> Array:

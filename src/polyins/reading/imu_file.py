@@ -8,21 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from polyins.checks import stream_checks
-from polyins.checks.faults import without_faults
+from polyins.checks.no_data import AFTER, LEAP
 from polyins.config import ImuColumns, ImuEntry
-from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats import columns, kf_gins, table
 from polyins.formats.columns import Column
 from polyins.formats.recognize import imu_format
 from polyins.formats.rows import ImuRows, RowSource
+from polyins.model.findings import Finding
 from polyins.model.recording import Array, ImuStream, usual_interval
 from polyins.prepare.timesync import gaps_of
-from polyins.reading.imu_stream import in_array_axes
+from polyins.reading.imu_stream import in_array_axes, measured
 
 CONTEXT = 64
 """rows before each piece that say what repeats and where an interval begins"""
+SAMPLED = 8
+"""rows of each piece that tell whether the IMU shows anything"""
 
 Pieces = Callable[[str, Sequence[Column]], Iterator[tuple[RowSource, list[Array]]]]
 
@@ -40,58 +41,79 @@ class StreamExtent:
     """the last stamp before and the first after each"""
     interval: float
     """the usual one, s"""
-    warnings: tuple[str, ...] = ()
-    """of rows that the chip did not measure"""
+    sample: ImuStream
+    """a few rows from all over the file, in array axes"""
+    findings: tuple[Finding, ...] = ()
+    """of rows that show nothing of the motion"""
 
 
 class ImuFile:
     """Increments of one IMU in array axes, from a file in the order of time; raises InputError for any other format."""
 
-    def __init__(self, entry: ImuEntry) -> None:
+    def __init__(self, entry: ImuEntry, *, alone: bool) -> None:
+        """`alone`: there is no other IMU that could go on without this one."""
         self.entry = entry
+        self.alone = alone
         self.source = RowSource(str(find(entry.file)))
         self.columns, self._pieces = _format(entry)
         self._cells = table.imu_cells(self.columns, entry.rate_hz)
 
     def extent(self) -> StreamExtent:
-        """Read all rows for their stamps; raise InputError where they do not increase or values are no numbers."""
+        """Read all rows for their stamps; raise InputError as `imu_stream.read_imu` does."""
         first, last, rows, usual = np.nan, np.nan, 0, np.nan
         gaps: list[tuple[float, float]] = []
-        warnings: list[str] = []
-        for fresh, texts in self._rows():
+        found: list[Finding] = []
+        sample = _nothing(self.entry.name)
+        for fresh, findings in self._rows():
             time = fresh.time + self.entry.clock_offset_s
-            warnings += texts
+            found += findings
             if not len(time):
                 continue
             if not rows:
                 first, usual = time[0], usual_interval(time) if len(time) > 1 else np.nan
             gaps += gaps_of(time if not rows else np.concatenate([[last], time]), usual)
             rows, last = rows + len(time), time[-1]
-        if rows < 2:
-            raise InputError(f"{self.source.path}: {rows} row(s); expected at least 2")
-        return StreamExtent(float(first), float(last), rows, tuple(gaps), float(usual), tuple(warnings))
+            sample = _joined(sample, _part(in_array_axes(fresh, self.entry), 0, SAMPLED))
+        return StreamExtent(float(first), float(last), rows, tuple(gaps), float(usual), sample, tuple(found))
 
     def stretches(self) -> Iterator[ImuStream]:
         """Give the rows piece by piece."""
         for rows, _ in self._rows():
             yield in_array_axes(rows, self.entry)
 
-    def _rows(self) -> Iterator[tuple[ImuRows, tuple[str, ...]]]:
-        """Give the rows that the chip measured, piece by piece, and warnings of those that it did not."""
+    def _rows(self) -> Iterator[tuple[ImuRows, tuple[Finding, ...]]]:
+        """Give the rows that show something of the motion, piece by piece, and findings of those that do not."""
         before: list[Array] | None = None
-        done = 0
-        for source, values in self._pieces(self.source.path, self._cells):
+        done, last = 0, -np.inf
+        for source, values in self._whole_pieces():
             known = 0 if before is None else len(before[0])
             whole = values if before is None else [np.concatenate([a, b]) for a, b in zip(before, values, strict=True)]
             rows = table.imu_rows(source, whole, self.columns, self.entry.rate_hz, done - known)
             row = (0 if source.first_line else done) - known
-            stream_checks.check_finite(source, {"time": rows.time, "gyro": rows.dtheta, "accel": rows.dvel}, row)
-            stream_checks.check_order(source, rows.time, first_row=row)
-            good, texts = without_faults(rows, self.entry.name, self.entry.clock_offset_s)
-            fresh = _after(good, rows.time[known - 1] if known else -np.inf)
-            yield fresh, texts if len(fresh.time) < len(rows.time) - known else ()
-            done += len(rows.time) - known
+            good, found = measured(rows, self.entry, alone=self.alone, first_row=row)
+            fresh = _after(good, last)
+            yield fresh, found if len(fresh.time) < len(rows.time) - known else ()
+            done, last = done + len(rows.time) - known, fresh.time[-1] if len(fresh.time) else last
             before = [column[-CONTEXT:] for column in whole]
+
+    def _whole_pieces(self) -> Iterator[tuple[RowSource, list[Array]]]:
+        """Give pieces that do not end soon after a leap of the stamps: what follows tells whether to believe it."""
+        held: tuple[RowSource, list[Array]] | None = None
+        for source, values in self._pieces(self.source.path, self._cells):
+            piece = (source, values)
+            if held is not None:
+                piece = held[0], [np.concatenate([a, b]) for a, b in zip(held[1], values, strict=True)]
+            held = piece if self._ends_after_leap(piece[1]) else None
+            if held is None:
+                yield piece
+        if held is not None:
+            yield held
+
+    def _ends_after_leap(self, values: list[Array]) -> bool:
+        if self.entry.rate_hz or self.columns.time is None:
+            return False
+        steps = np.diff(values[-1][-AFTER - 1 :]) * table.SECONDS[self.columns.time.unit]
+        return bool((steps > LEAP).any())
 
 
 def _after(rows: ImuRows, time: float) -> ImuRows:
@@ -123,6 +145,7 @@ class StretchReader:
     """A stream that is read on: `until` gives a stretch of it, the next one overlapping it."""
 
     def __init__(self, file: ImuFile) -> None:
+        self._name = file.entry.name
         self._ahead: Iterator[ImuStream] = file.stretches()
         self._held: ImuStream | None = None
 
@@ -133,11 +156,16 @@ class StretchReader:
             if more is None:
                 break
             self._held = more if self._held is None else _joined(self._held, more)
-        assert self._held is not None
+        if self._held is None:
+            return _nothing(self._name)
         stretch = _part(self._held, None, int(np.searchsorted(self._held.time, end, "right")))
         kept = _part(self._held, int(np.searchsorted(self._held.time, keep_from)), None)
         self._held = _joined(kept)  # a copy: a part would hold the whole
         return stretch
+
+
+def _nothing(name: str) -> ImuStream:
+    return ImuStream(name, np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
 
 
 def _joined(*parts: ImuStream) -> ImuStream:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.checks import stream_checks
 from polyins.checks.faults import clipped, without_faults
+from polyins.checks.no_data import within_any_range, without_nonsense
 from polyins.config import ImuEntry, InitialStd
 from polyins.config.units import read
 from polyins.config.wheel_mount import wheel_rotation
@@ -19,33 +20,67 @@ from polyins.formats import kf_gins, table, xsens_dot
 from polyins.formats.recognize import imu_format
 from polyins.formats.rows import ImuRows, intervals, without
 from polyins.model.axes import axes_matrix
+from polyins.model.findings import Finding
 from polyins.model.recording import Array, ImuStream
 from polyins.model.rig import DEG, Imu, ImuErrors, NoiseGrade
+from polyins.prepare.plausible import limits_of
 
 FULL = 0.999
 """A rate above this part of the full scale has reached it."""
 MOST_SATURATED = 0.1
 """of the rows"""
+MOST_LOST = 0.1
+"""of the rows of the only IMU that are no numbers or out of order"""
 
 
-def read_imu(entry: ImuEntry, index: int, document: Document) -> tuple[Imu, ImuStream, tuple[str, ...]]:
-    """Read the IMU of that index; returns its mount and errors, its increments in array axes, and warnings.
+@dataclass(frozen=True)
+class ReadImu:
+    """What the file of one IMU says."""
 
-    Raises InputError for data and settings that cannot be right.
+    entry: ImuEntry
+    imu: Imu
+    """its mount and errors"""
+    rows: ImuRows
+    """that show something of the motion"""
+    stream: ImuStream
+    """the same in array axes, on a wheel in the module's"""
+    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    """what is left out of the file"""
+
+    def check(self) -> tuple[str, ...]:
+        """Return warnings of rates and units; raise InputError for those that cannot be right."""
+        return (*checked(self.rows, self.entry), *self.warnings)
+
+
+def read_imu(entry: ImuEntry, index: int, document: Document, *, alone: bool) -> ReadImu:
+    """Read the IMU of that index; `alone`: there is no other one that could go on without it.
+
+    Raises InputError for a file that cannot be read; of an IMU that is alone, too, if many rows are not numbers or out
+    of order.
     """
     with document.at(["imus", index, "file"]):
         find_named(entry.file)
-    rows, saturated = _within_range(_rows(entry, document.place(["imus", index])), entry)
-    warnings = (*_checked(rows, entry), *saturated)
-    rows, faults = without_faults(rows, entry.name, entry.clock_offset_s)
+    rows, found = measured(_rows(entry, document.place(["imus", index])), entry, alone=alone)
+    rows, saturated = _within_range(rows, entry)
     range_known = (entry.gyro_range_deg_s or rows.gyro_range_deg_s) is not None
-    warnings += (*faults, *clipped(rows, entry.name, entry.clock_offset_s, gyro=not range_known))
-    stream = in_array_axes(rows, entry)
-    if entry.wheel is None:
-        place = document.place(["imus", index, "axes"])
-        stream_checks.check_upright(entry.name, place, entry.axes, stream.time, stream.dvel)
+    at_its_end = clipped(rows, entry.name, entry.clock_offset_s, gyro=not range_known) if len(rows.time) > 1 else ()
     with document.at(["imus", index]):
-        return as_mounted(entry), stream, warnings
+        return ReadImu(entry, as_mounted(entry), rows, in_array_axes(rows, entry), (*saturated, *at_its_end), found)
+
+
+def measured(rows: ImuRows, entry: ImuEntry, *, alone: bool, first_row: int = 0) -> tuple[ImuRows, tuple[Finding, ...]]:
+    """Leave out the rows that show nothing of the motion, and say so; `alone` as for `read_imu`.
+
+    `first_row`: of the rows in the file.
+    """
+    name, offset = entry.name, entry.clock_offset_s
+    known, (rows, found) = rows, without_nonsense(rows, name, offset)
+    if alone and len(rows.time) < max(2.0, (1.0 - MOST_LOST) * len(known.time)):
+        stream_checks.check_rows(known, first_row)
+    rows, beyond = within_any_range(rows, name, offset, limits_of(on_wheel=entry.wheel is not None))
+    rows, faults = without_faults(rows, name, offset)
+    return rows, (*found, *beyond, *faults)
 
 
 def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
@@ -78,7 +113,8 @@ def _rows(entry: ImuEntry, place: str) -> ImuRows:
     return replace(rows, time=np.arange(len(rows.time)) / entry.rate_hz) if entry.rate_hz else rows
 
 
-def _checked(rows: ImuRows, entry: ImuEntry) -> tuple[str, ...]:
+def checked(rows: ImuRows, entry: ImuEntry) -> tuple[str, ...]:
+    """Return warnings of rates and units; raise InputError for those that cannot be right."""
     if entry.wheel is None:
         return stream_checks.check_imu(rows)
     return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, entry.wheel.radius_m)

@@ -16,7 +16,7 @@ from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
 from polyins.model.recording import FilterOptions, ImuStream, Offset, Recording
 from polyins.model.rig import Imu, Rig
-from polyins.reading import catalogue, clocks
+from polyins.reading import catalogue, clocks, usable
 from polyins.reading.imu_stream import as_mounted, read_imu
 from polyins.reading.position_stream import read_gnss, read_reference
 from polyins.reading.sensor_stream import constraint_of, entries, read_sensors, sensors_of
@@ -98,17 +98,27 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     `wheels_known`: check that wheels turn as declared; what calibrates them needs not know yet.
     """
     notes = wheel_checks.check_settings(config, document)
-    mounted = [read_imu(entry, index, document) for index, entry in enumerate(config.imus)]
-    imus, streams, warnings = zip(*mounted, strict=True)
-    notes += _one_by_kind([text for texts in warnings for text in texts])
-    faults.check_alive(streams)
-    faults.check_distinct(streams)
+    alone = len(config.imus) == 1
+    found = [read_imu(entry, index, document, alone=alone) for index, entry in enumerate(config.imus)]
+    alive, dead = faults.alive([one.stream for one in found])
+    notes += _one_by_kind([text for i in alive for text in found[i].check()])
+    measuring = [found[i] for i in alive]
+    faults.check_distinct([one.stream for one in measuring])
+    kept, fallen = usable.upright([one.entry for one in measuring], alive, [one.stream for one in measuring], document)
+    known, config = config, config.model_copy(update={"imus": tuple(measuring[i].entry for i in kept)})
+    imus, streams = tuple(measuring[i].imu for i in kept), tuple(measuring[i].stream for i in kept)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
     notes += [clocks.described(offset) for offset in offsets]
-    span = stream_checks.check_common_span({stream.name: (stream.time[0], stream.time[-1]) for stream in streams})
+    kept, apart = usable.overlapping(config.imus, [(stream.time[0], stream.time[-1]) for stream in streams])
+    config = config.model_copy(update={"imus": tuple(config.imus[i] for i in kept)})
+    imus, streams = tuple(imus[i] for i in kept), tuple(streams[i] for i in kept)
+    findings = (*dead, *fallen, *apart, *(finding for one in measuring for finding in one.findings))
+    spans = {stream.name: (stream.time[0], stream.time[-1]) for stream in streams}
+    span = stream_checks.check_common_span(spans, wait=any(imu.wheel for imu in imus))
     recording = assemble(config, document, imus, streams, span, wheels_known)
     warnings = (*notes, *recording.warnings)
-    return replace(recording, warnings=warnings, clock_offsets=offsets, config_text=in_force(config, offsets))
+    text = in_force(known, offsets)
+    return replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
 
 
 def assemble(

@@ -22,7 +22,7 @@ from polyins.model.recording import ImuStream, Recording
 from polyins.navigate.restart import HOPELESS
 from polyins.prepare import timesync
 from polyins.prepare.timesync import Aligned, Whole
-from polyins.reading import loading
+from polyins.reading import loading, usable
 from polyins.reading.imu_file import ImuFile, StreamExtent, StretchReader, can_be_read_in_order
 from polyins.reading.imu_stream import as_mounted
 
@@ -34,6 +34,8 @@ AROUND_START_S = 60.0
 """of the beginning after a start that is given"""
 MOST_HEAD_ROWS = 20_000_000
 """up to a start that is given"""
+CHECKED_S = 30.0
+"""of an IMU that begins later, which tell its units and axes"""
 MARGIN_S = 3.0
 """by which the stretches overlap while they are aligned"""
 LEAST_FIRST_S = 10.0
@@ -62,12 +64,16 @@ class LongRecording:
 
     @property
     def gaps(self) -> list[list[tuple[float, float]]]:
-        """Where each IMU has no data within the span, s, s, its end included if others go on without it."""
-        (begin, end), found = self.span, []
-        for extent in self.extents:
-            known = [gap for gap in extent.gaps if gap[1] > begin and gap[0] < end]
-            found.append(known + ([(extent.last, end)] if end - extent.last > timesync.LATE else []))
-        return found
+        """Where each IMU has no data within the span, s, s, its ends included if others go on without it."""
+        return [
+            ([(self.span[0], one.first)] if one.first - self.span[0] > timesync.LATE else []) + self._later_gaps(one)
+            for one in self.extents
+        ]
+
+    def _later_gaps(self, of: StreamExtent) -> list[tuple[float, float]]:
+        begin, end = self.span
+        known = [gap for gap in of.gaps if gap[1] > begin and gap[0] < end]
+        return known + ([(of.last, end)] if end - of.last > timesync.LATE else [])
 
     def subset(self, indices: Sequence[int]) -> LongRecording:
         """Return the recording with just the IMUs of those indices."""
@@ -94,9 +100,9 @@ class LongRecording:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Say which IMUs begin late or have gaps."""
-        gaps = zip(self.head.rig.imus, self.gaps, strict=True)
-        late = timesync.late_beginnings(self.head.imus)
-        return (*late, *(timesync.gap_finding(imu.name, known) for imu, known in gaps if known))
+        names, gaps = [file.entry.name for file in self.files], map(self._later_gaps, self.extents)
+        late = timesync.late_beginnings(names, self._whole.begins, wait=not self._bridge)
+        return (*late, *(timesync.gap_finding(name, known) for name, known in zip(names, gaps, strict=True) if known))
 
     @property
     def _bridge(self) -> bool:
@@ -105,12 +111,14 @@ class LongRecording:
     @property
     def _whole(self) -> Whole:
         of = self.extents
-        ends, intervals = np.array([one.last for one in of]), np.array([one.interval for one in of])
-        return Whole(tuple(len(one.gaps) for one in of), ends, intervals)
+        begins, ends, intervals = np.array([(one.first, one.last, one.interval) for one in of]).T
+        return Whole(tuple(len(one.gaps) for one in of), begins, ends, intervals)
 
     def _borders(self, end: float, stretch_s: float) -> list[float]:
         """Return where stretches end: not near a gap or an end of any IMU, whose both sides lie within one stretch."""
-        gaps = sorted([gap for one in self.extents for gap in (*one.gaps, (one.last, one.last))])
+        gaps = sorted(
+            [gap for one in self.extents for gap in ((one.first, one.first), *one.gaps, (one.last, one.last))]
+        )
         borders = []
         border = self.span[0] + max(stretch_s, 4.0 * MARGIN_S)
         while border < end - 2.0 * MARGIN_S:
@@ -133,24 +141,48 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
         return None
     if sum(_rows_at_most(entry.file) for entry in config.imus) < least_rows:
         return None
-    files = tuple(ImuFile(entry) for entry in config.imus)
+    alone = len(config.imus) == 1
+    files = tuple(ImuFile(entry, alone=alone) for entry in config.imus)
     extents = tuple(file.extent() for file in files)
     if sum(extent.rows for extent in extents) < least_rows:
         return None
     notes = wheel_checks.check_settings(config, document)
+    known = config
+    alive, dead = faults.alive([extent.sample for extent in extents])
+    config, files, extents = _of_imus(alive, config, files, extents)
+    kept, apart = usable.overlapping(config.imus, [(extent.first, extent.last) for extent in extents])
+    config, files, extents = _of_imus(kept, config, files, extents)
+    places = [alive[i] for i in kept]
     span = _span(files, extents)
     if _pauses(extents):
         return None  # each part is a run of its own
     until = _head_end(config, document, extents, span)
     streams = tuple(StretchReader(file).until(until, span[0]) for file in files)
-    for number in range(len(files)):
-        notes += (*_checked(files[number], streams[number], number, document), *extents[number].warnings)
-    faults.check_alive(streams)
+    beginnings = [
+        StretchReader(file).until(max(until, extent.first + CHECKED_S), extent.first)
+        for file, extent in zip(files, extents, strict=True)
+    ]
+    for file, beginning in zip(files, beginnings, strict=True):
+        notes += _checked(file, beginning)
     faults.check_distinct(streams)
+    findings = (*dead, *apart, *(finding for extent in extents for finding in extent.findings))
+    kept, fallen = usable.upright(config.imus, places, beginnings, document)
+    if fallen:
+        config, files, extents = _of_imus(kept, config, files, extents)
+        span, streams = _span(files, extents), tuple(streams[i] for i in kept)
     imus = tuple(as_mounted(entry) for entry in config.imus)
     head = loading.assemble(config, document, imus, streams, span)
     warnings = (*warnings, *notes, *head.warnings)
-    return LongRecording(replace(head, warnings=warnings, config_text=loading.in_force(config)), files, extents, span)
+    findings = (*findings, *fallen)
+    text = loading.in_force(known)
+    return LongRecording(replace(head, warnings=warnings, findings=findings, config_text=text), files, extents, span)
+
+
+def _of_imus(
+    indices: Sequence[int], config: Config, files: Sequence[ImuFile], extents: Sequence[StreamExtent]
+) -> tuple[Config, tuple[ImuFile, ...], tuple[StreamExtent, ...]]:
+    kept = config.model_copy(update={"imus": tuple(config.imus[i] for i in indices)})
+    return kept, tuple(files[i] for i in indices), tuple(extents[i] for i in indices)
 
 
 def _pauses(extents: Sequence[StreamExtent]) -> bool:
@@ -205,16 +237,13 @@ def _rows_at_most(path: str) -> int:
 
 def _span(files: Sequence[ImuFile], extents: Sequence[StreamExtent]) -> tuple[float, float]:
     ends = {file.entry.name: (extent.first, extent.last) for file, extent in zip(files, extents, strict=True)}
-    return stream_checks.check_common_span(ends)
+    return stream_checks.check_common_span(ends, wait=any(file.entry.wheel for file in files))
 
 
-def _checked(file: ImuFile, stream: ImuStream, index: int, document: Document) -> tuple[str, ...]:
+def _checked(file: ImuFile, stream: ImuStream) -> tuple[str, ...]:
     """Check the beginning of an IMU's data; what is looked at does not depend on the axes."""
     gyro, accel, wheel = file.columns.gyro.unit, file.columns.accel.unit, file.entry.wheel
     rows = ImuRows(file.source, stream.time, stream.dtheta, stream.dvel, gyro_unit=gyro, accel_unit=accel)
     if wheel is not None:
         return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, wheel.radius_m)
-    warnings = stream_checks.check_imu(rows)
-    place = document.place(["imus", index, "axes"])
-    stream_checks.check_upright(file.entry.name, place, file.entry.axes, stream.time, stream.dvel)
-    return warnings
+    return stream_checks.check_imu(rows)

@@ -9,6 +9,7 @@ from polyins.config.units import read
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.model.recording import GnssStream, StartOptions
+from polyins.prepare.timesync import LATE
 
 Span = tuple[float, float]
 
@@ -18,6 +19,10 @@ def start_options(start: StartEntry, document: Document, span: Span) -> tuple[St
 
     Raises InputError for times outside the data.
     """
+    still = start.static_interval_s
+    if still is not None:
+        # one IMU that begins a little later than the others, or ends before them, shortens it
+        start = start.model_copy(update={"static_interval_s": (_within(still[0], span), _within(still[1], span))})
     _check_times(start, document, span)
     warnings = []
     if start.end_time_s is not None and start.end_time_s > span[1]:
@@ -25,6 +30,11 @@ def start_options(start: StartEntry, document: Document, span: Span) -> tuple[St
         warnings.append(f"{place}: is {start.end_time_s:.3f}; the data end at {span[1]:.3f} s")
     position = start.position and start.position.coordinates()
     return read(start, StartOptions, position=position), warnings
+
+
+def _within(time: float, span: Span) -> float:
+    nearest = min(max(time, span[0]), span[1])
+    return nearest if abs(nearest - time) < LATE else time
 
 
 def _check_times(start: StartEntry, document: Document, span: Span) -> None:

@@ -84,7 +84,7 @@ def findings_by_text(scene: Scene) -> list[tuple[str, str, str]]:
             names.extend([run.name] if run.name not in names else [])
     known = [(*of, "" if len(names) == len(scene.runs) else ", ".join(names)) for of, names in given.items()]
     texts = {text for _, text, _ in known}
-    known += [("note", text, "") for text in dict.fromkeys(scene.recording.warnings) if text not in texts]
+    known += [("note", text, "") for text in dict.fromkeys(scene.recording.sentences) if text not in texts]
     return sorted(known, key=lambda one: ("serious", "doubt", "note").index(one[0]))
 
 

@@ -91,7 +91,7 @@ def _describe_configuration(path: str | Path) -> Facts:
         "gnss": _timing(gnss.time) if gnss else None,
         "reference": _timing(reference.time) if reference else None,
         "outages": [list(outage) for outage in recording.outages],
-        "warnings": list(recording.warnings),
+        "warnings": list(recording.sentences),
     }
 
 

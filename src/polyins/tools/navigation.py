@@ -110,7 +110,13 @@ def _parts(
         part = batch.navigate(run)
         if progress:
             progress(float((stretch.time[-1] - start.time) / (end - start.time)))
-        known = (*notes(recording.head.warnings), *recording.findings, *votes, *silent.findings())
+        known = (
+            *notes(recording.head.warnings),
+            *recording.head.findings,
+            *recording.findings,
+            *votes,
+            *silent.findings(),
+        )
         span = min(one.first for one in recording.extents), max(one.last for one in recording.extents)
         yield replace(part, findings=known, recording_span=span)
 
