@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from polyins.aiding import kinds
 from polyins.errors import InputError
-from polyins.kernels import dense
+from polyins.kernels import bank, covariance, dense
+from polyins.kernels.bank import LANES
+from polyins.model.attitude import euler_angles
 from polyins.model.findings import SILENT, Finding, notes
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
@@ -110,13 +112,41 @@ def run(
 ) -> Solution:
     """Navigate a recording with one method and return its solution.
 
-    After a pause in which no IMU of an array has data the state is found anew, see `restart`. `imu` is the index of
-    the IMU that `single` uses. `progress` is called with the share of epochs done. Raises InputError for a method that
-    is unknown or data that give no start.
+    After a pause in which no IMU has data the state is found anew, see `restart`. `imu` is the index of the IMU that
+    `single` uses. `progress` is called with the share of epochs done. Raises InputError for a method that is unknown or
+    data that give no start.
     """
-    if restart.pauses(recording):
-        return restart.run_parts(recording, lambda part: navigate(prepare(part, method, imu=imu), progress))
-    return navigate(prepare(recording, method, imu=imu), progress)
+    taken = choose(find_method(method), recording.rig, imu).all
+    pauses = restart.pauses(recording.subset(taken))
+    if not pauses:
+        return navigate(prepare(recording, method, imu=imu), progress)
+
+    def of_part(part: Recording, before: restart.Known | None) -> tuple[Solution, restart.Known]:
+        prepared = prepare(part, method, imu=imu, before=before)
+        return navigate(prepared, progress), known(prepared, -1)
+
+    return restart.run_parts(recording, pauses, of_part)
+
+
+def known(run: Prepared, last: int) -> restart.Known:
+    """Return what a run knows which has taken all epochs up to its row `last`."""
+    state, stride = run.state, int(run.plan.settings[places.STRIDE])
+    row, variance = run.outputs.states[last], run.outputs.variances[last]
+    errors = {}
+    for s, (begin, end) in enumerate(run.bank.spans):
+        std = np.sqrt([covariance.variance(state.blocks[s], covariance.NAV + k, stride) for k in range(IMU_ERRORS)])
+        for lane in range(begin, end):
+            first = bank.ERRORS + lane % LANES
+            own = state.rows[lane // LANES, first : first + IMU_ERRORS * LANES : LANES].copy()
+            errors[run.bank.members[lane].imu.name] = own, std
+    return restart.Known(
+        time=float(run.inputs.time[last]),
+        position=row[0:3].copy(),
+        velocity=row[3:6].copy(),
+        heading=float(euler_angles(row[None, 6:10])[0, 2]),
+        position_std=np.sqrt(variance[0:3]),
+        imu_errors=errors,
+    )
 
 
 def navigate(prepared: Prepared, progress: Callable[[float], None] | None = None) -> Solution:
@@ -147,10 +177,18 @@ def _check_finite(run: Prepared) -> None:
         )
 
 
-def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance: bool = False) -> Prepared:
+def prepare(
+    recording: Recording,
+    method: str,
+    *,
+    imu: int = 0,
+    dense_covariance: bool = False,
+    before: restart.Known | None = None,
+) -> Prepared:
     """Lay a run out, as `run` does before its first epoch.
 
-    The dense covariance is the papers' form with full matrices, there to be compared with.
+    `before`: what was known before the pause that the recording follows. The dense covariance is the papers' form with
+    full matrices, there to be compared with.
     """
     row = find_method(method)
     choice = choose(row, recording.rig, imu)
@@ -158,6 +196,8 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     aligned = timesync.align(recording.imus, bridge=not recording.rig.has_wheels)
     aligned = replace(aligned, findings=(*aligned.findings, *disagreements(recording.rig, aligned)))
     start = start_of(row, recording, aligned)
+    if before is not None and restart.is_lost(recording):
+        start = restart.as_lost(start, before)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
     if len(aligned.time) < 2:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.files import write_bytes
+from polyins.model.findings import Finding
 from polyins.model.recording import FilterOptions
 from polyins.model.rig import Rig
 from polyins.navigate.events import Events
@@ -55,6 +56,10 @@ class Made:
     """of which the run begins, as long as there is only one"""
     due: tuple[float, float, float, bool] | None
     """what the schedule of its own measurements remembers"""
+    findings: tuple[Finding, ...] = ()
+    """what there is to say of the run so far"""
+    fixes: bool = False
+    """whether there were any"""
 
 
 def write(path: Path, made: Made, assembly: Assembly, early: Events, timeline: Timeline | None) -> None:
@@ -95,6 +100,7 @@ def _converter() -> Converter:
     converter = Converter()
     converter.register_unstructure_hook_func(_is_array, lambda array: array.tolist())
     converter.register_structure_hook_func(_is_array, lambda value, _: np.array(value))
+    converter.register_structure_hook_func(lambda kind: kind == float | str | None, lambda value, _: value)
     return converter
 
 

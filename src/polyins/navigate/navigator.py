@@ -6,6 +6,7 @@ A recording that is played through it gives the solution of a batch run, bit for
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,10 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.aiding import kinds
 from polyins.errors import InputError
 from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.findings import Finding
 from polyins.model.methods import find_method
 from polyins.model.recording import AidingStream, FilterOptions, Recording, StartOptions
 from polyins.model.rig import Rig
-from polyins.navigate import batch, checkpoint, events
+from polyins.navigate import batch, checkpoint, events, restart
+from polyins.navigate.ahead import Ahead, Increments, Measured
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
@@ -27,13 +30,14 @@ from polyins.navigate.starter import Starter, after_start
 from polyins.navigate.timeline import Timeline
 from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
-from polyins.prepare.assembly import DUPLICATED, FUTURE_STAMPED, LATE, Assembly, Epoch
+from polyins.prepare.assembly import DUPLICATED, FUTURE, FUTURE_STAMPED, LATE, Assembly, Epoch
 from polyins.prepare.timesync import Aligned
 from polyins.version import __version__
 
 Array = NDArray[np.float64]
 
 NOT_FINITE, BEFORE_START, NO_STD = "not finite", "before the start", "std not positive"
+IN_PAUSE = "without IMU data"
 HEALTH_WINDOW = 1.0  # s
 
 
@@ -131,6 +135,13 @@ class Navigator:
         """measurements that came before the first epoch"""
         self.counts: dict[str, int] = {}
         """what was refused, by kind"""
+        self._ahead = Ahead()
+        self._findings: list[Finding] = []
+        self._ended: Timeline | None = None
+        """of the part before a pause, until the part after it has one"""
+        self._has_fixes = False
+        self.caught_up: Callable[[Sample], None] | None = None
+        """called after each of the samples that were collected before a start, with it"""
         self._starter: Starter | None = None
         if isinstance(start, Start):
             self._begin_from(start)
@@ -144,6 +155,11 @@ class Navigator:
     def waits_for(self) -> str:
         """Why there is no start yet; empty once there is one."""
         return "" if self._starter is None else self._starter.why
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What there is to say of the run: pauses, and what was made of them."""
+        return tuple(self._findings)
 
     def _begin_from(self, start: Start) -> None:
         if len(start.imu_errors) != self._imus:
@@ -161,16 +177,22 @@ class Navigator:
         start, collected = found
         for kind, count in starter.counts.items():
             self.counts[kind] = self.counts.get(kind, 0) + count
+        self._findings += starter.findings
         self._begin_from(start)
-        names = [imu.name for imu in self._made.rig.imus]
         for one in after_start(start, collected):
-            if isinstance(one, ImuSample):
-                self.imu(one.time, one.dtheta, one.dvel, names.index(one.imu))
-            elif isinstance(one, SensorSample):
-                self.aid(one.kind, one.time, one.value, one.std)
-            else:
-                assert one.position_std is not None
-                self.gnss(one.time, one.position, one.position_std, one.velocity, one.velocity_std)
+            self._take_sample(one)
+            if self.caught_up is not None:
+                self.caught_up(one)
+
+    def _take_sample(self, sample: Sample) -> None:
+        if isinstance(sample, ImuSample):
+            names = [imu.name for imu in self._made.rig.imus]
+            self.imu(sample.time, sample.dtheta, sample.dvel, names.index(sample.imu))
+        elif isinstance(sample, SensorSample):
+            self.aid(sample.kind, sample.time, sample.value, sample.std)
+        else:
+            assert sample.position_std is not None
+            self.gnss(sample.time, sample.position, sample.position_std, sample.velocity, sample.velocity_std)
 
     def imu(self, time: float, dtheta: ArrayLike, dvel: ArrayLike, imu: int | None = None) -> None:
         """Take what IMU `imu` of the rig measured in the interval that ends at `time`, s: rad and m/s, shape (3,).
@@ -186,12 +208,78 @@ class Navigator:
         if not _finite(time, values):
             self._refuse(NOT_FINITE)
         elif self._starter is not None:
-            self._collect(ImuSample(self._made.rig.imus[imu].name, time, values[:3], values[3:]))
+            self._collect(self._sample(imu, time, values))
         elif imu in self._place:
-            refused = self._assembly.add(self._place[imu], time, values)
-            if refused:
-                self._refuse(refused)
+            self._add(self._place[imu], time, values)
             self._step()
+
+    def _sample(self, imu: int, time: float, values: Array) -> ImuSample:
+        return ImuSample(self._made.rig.imus[imu].name, time, values[:3], values[3:])
+
+    def _add(self, i: int, time: float, values: Array) -> None:
+        """Let a sample of the IMU at place i wait for its epoch, or for what is told by those after it."""
+        if self._starter is not None:
+            self._collect(self._sample(self._taken[i], time, values))
+            return
+        newest = self._assembly.newest
+        if time > newest + FUTURE and newest > -math.inf:
+            for one in self._ahead.hold(Increments(time, i, values)):
+                self._refuse(self._assembly.add(one.imu, one.time, one.values))
+            if self._ahead.goes_on:
+                self._end_pause(newest)
+            return
+        self._refuse(self._assembly.add(i, time, values))
+        if self._ahead:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Take what is no longer ahead of the IMUs, which go on where they were, and refuse what still is."""
+        for one in self._ahead.in_order(self._recording.options.gnss_snap):
+            if isinstance(one, Increments):
+                self._refuse(self._assembly.add(one.imu, one.time, one.values))
+            elif one.sample.time > self._assembly.newest + self.delay:
+                self._refuse(FUTURE_STAMPED)
+            else:
+                self._apply(one.events)
+
+    def _end_pause(self, last: float) -> None:
+        """Go on after a pause, which began at `last`, s, or anew if it was hopeless."""
+        first = self._ahead.first
+        held = self._ahead.in_order(self._recording.options.gnss_snap)
+        if first - last > restart.hopeless(self._recording.rig):
+            self._begin_anew(last, first)
+        else:
+            self._assembly.newest = first
+        for one in held:
+            if isinstance(one, Increments):
+                self._add(one.imu, one.time, one.values)
+                self._step()
+            elif self._starter is None:
+                self._apply(one.events)
+            elif one.sample.time >= first:
+                self._collect(one.sample)
+            else:
+                self._refuse(IN_PAUSE)
+
+    def _begin_anew(self, last: float, first: float) -> None:
+        """End the run at a pause, from `last` to `first`, s, and look for a start after it."""
+        self._step(at_end=True)
+        line = self._timeline
+        before = None if line is None else batch.known(line.run, line.last)
+        lost = self._recording.rig.has_wheels and not self._has_fixes
+        blank = Recording(self._made.rig, (), geodetic=self._recording.geodetic, options=self._recording.options)
+        starter = Starter(
+            restart.after(blank, before, lost),
+            max(self.delay, self._made.wait),
+            not lost,
+            self._made.method,
+            self._made.imu,
+        )
+        starter.after, starter.before = (last, first), before if lost else None
+        self._ended, self._timeline, self._schedule = line, None, None
+        self._first, self._early, self.start = None, [], None
+        self._assembly = Assembly(len(self._taken), self._made.wait, bridge=not self._recording.rig.has_wheels)
+        self._starter = starter
 
     def gnss(
         self,
@@ -210,10 +298,14 @@ class Navigator:
             self._collect_fix(time, position, position_std, velocity, velocity_std)
             return
         antenna = self._recording.rig.antenna
+        place, std = np.asarray(position, dtype=np.float64), np.asarray(position_std, dtype=np.float64)
+        sample = GnssFix(time, place, std, geodetic=self._recording.geodetic)
         fix = [events.of_point(kinds.GNSS_POSITION, time, position, antenna, position_std)]
         if velocity is not None and velocity_std is not None:
             fix.append(events.of_point(kinds.GNSS_VELOCITY, time, velocity, antenna, velocity_std))
-        self._measure(*fix)
+            sample = sample._replace(velocity=np.asarray(velocity), velocity_std=np.asarray(velocity_std))
+        self._has_fixes = True
+        self._measure(sample, *fix)
 
     def aid(self, kind: str, time: float, value: float, std: ArrayLike) -> None:
         """Take what a sensor of the rig shows: a height in m, a heading in rad, or the speed of an odometer in m/s.
@@ -230,7 +322,7 @@ class Navigator:
                 self._refuse(NOT_FINITE)
             return
         stream = AidingStream(kind, np.array([time]), np.array([value], dtype=np.float64), stds[None])
-        self._measure(events.of_sensor(stream, self._recording.rig))
+        self._measure(SensorSample(kind, time, value, stds), events.of_sensor(stream, self._recording.rig))
 
     def _collect_fix(
         self,
@@ -253,19 +345,24 @@ class Navigator:
 
     def flush(self) -> None:
         """Take everything that still waits: there are no more data."""
-        if self._starter is not None:
+        if self._ahead:
+            self._settle()
+        starter = self._starter
+        if starter is not None:
             self._collect(None)
+            if self._starter is not None and starter.after is not None:
+                self._findings += [*starter.findings, restart.left_out(starter.after, starter.why)]
         self._step(at_end=True)
 
     @property
     def state(self) -> NavigatorState | None:
-        """The state at the newest epoch; None before the first."""
+        """The state at the newest epoch; None before the first, and after a pause until there is a start again."""
         line = self._timeline
         return None if line is None else _state(line, line.last)
 
     def history(self, after: float = -math.inf) -> list[NavigatorState]:
         """Return the states of all epochs later than `after`, s, as far back as a measurement may still come."""
-        line = self._timeline
+        line = self._timeline or self._ended
         if line is None:
             return []
         begun = 1 if line.whole else 0
@@ -299,7 +396,14 @@ class Navigator:
         if self._starter is not None:
             raise InputError(f"{path}: there is no start yet ({self.waits_for}); expected one before a checkpoint")
         due = None if self._schedule is None else self._schedule.memory
-        made = replace(self._made, counts=self.counts, first=self._first, due=due)
+        made = replace(
+            self._made,
+            counts=self.counts,
+            first=self._first,
+            due=due,
+            findings=tuple(self._findings),
+            fixes=self._has_fixes,
+        )
         checkpoint.write(Path(path), made, self._assembly, events.merged(*self._early), self._timeline)
 
     @classmethod
@@ -317,6 +421,7 @@ class Navigator:
             wait=made.wait,
         )
         navigator.counts, navigator._first = made.counts, made.first
+        navigator._findings, navigator._has_fixes = list(made.findings), made.fixes
         navigator._early = [early.at(slice(row, row + 1)) for row in range(len(early.time))]
         navigator._assembly.restore(samples)
         if line:
@@ -345,9 +450,11 @@ class Navigator:
         epoch = self._assembly.pass_through(time, values)
         if epoch is not None:
             self._take(epoch)
+            if self._ahead:
+                self._settle()
             return
         for i, row in enumerate(values):
-            self._refuse(self._assembly.add(i, time, row))
+            self._add(i, time, row.copy())
         self._step()
 
     def _step(self, at_end: bool = False) -> None:
@@ -367,7 +474,7 @@ class Navigator:
         assert self.start is not None
         aligned = Aligned(time, increments, (), np.zeros((len(time), len(self._taken)), dtype=bool))
         prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start, gaps=True)
-        self._order = prepared.order
+        self._order, self._ended = prepared.order, None
         self._schedule = batch.schedule_of(self._choice, self._recording, self.start)
         return Timeline(prepared, self.delay)
 
@@ -409,16 +516,21 @@ class Navigator:
             events.scheduled(due, stamp, self._recording.options, rig),
         )
 
-    def _measure(self, *measurements: Events) -> None:
-        """Take measurements of one time and one source: all or none."""
+    def _measure(self, sample: Sample, *measurements: Events) -> None:
+        """Take measurements of one time and one source: all or none; `sample` is what came."""
         time = float(measurements[0].time[0])
         if not math.isfinite(time + sum(one.value.sum() + one.variance.sum() for one in measurements)):
             self._refuse(NOT_FINITE)
         elif not all((one.variance > 0.0).any() and not (one.variance < 0.0).any() for one in measurements):
             self._refuse(NO_STD)
         elif time > self._assembly.newest + self.delay:
-            self._refuse(FUTURE_STAMPED)
-        elif self._timeline is None:
+            for _ in self._ahead.hold_measured(Measured(sample, measurements)):
+                self._refuse(IN_PAUSE)
+        else:
+            self._apply(measurements)
+
+    def _apply(self, measurements: tuple[Events, ...]) -> None:
+        if self._timeline is None:
             self._early.extend(measurements)
         else:
             for one in measurements:
