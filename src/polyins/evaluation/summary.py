@@ -77,7 +77,7 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
         },
         "start": solution.start,
         "verdict": judged.document(),
-        "coverage": coverage(solution, figures.epochs),
+        "coverage": coverage(solution.recording_span, figures.epochs),
         "exclusions": [],
         "faults": judged.faults,
         "mounting": _mounting(solution),

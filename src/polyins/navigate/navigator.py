@@ -20,11 +20,14 @@ from polyins.model.findings import Finding
 from polyins.model.methods import find_method
 from polyins.model.recording import AidingStream, FilterOptions, Recording, StartOptions
 from polyins.model.rig import Rig
+from polyins.model.solution import Innovations, Trajectory
+from polyins.model.status import STATUSES, status_of
 from polyins.navigate import batch, checkpoint, events, restart
 from polyins.navigate.ahead import Ahead, Increments, Measured
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
+from polyins.navigate.record import Part, Record
 from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.starter import Starter, after_start
 from polyins.navigate.timeline import Timeline
@@ -32,6 +35,7 @@ from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.assembly import DUPLICATED, FUTURE, FUTURE_STAMPED, LATE, Assembly, Epoch
 from polyins.prepare.timesync import Aligned
+from polyins.prepare.votes import Windows
 from polyins.version import __version__
 
 Array = NDArray[np.float64]
@@ -59,6 +63,8 @@ class NavigatorState:
     """m/s, shape (3,)"""
     phi_covariance: Array
     """rad^2: NN, NE, ND, EE, ED, DD of the attitude error phi, shape (6,)"""
+    status: str
+    """what it is worth, one of `model.status.STATUSES`"""
 
     @property
     def euler(self) -> Array:
@@ -136,7 +142,7 @@ class Navigator:
         self.counts: dict[str, int] = {}
         """what was refused, by kind"""
         self._ahead = Ahead()
-        self._findings: list[Finding] = []
+        self._record = Record()
         self._ended: Timeline | None = None
         """of the part before a pause, until the part after it has one"""
         self._has_fixes = False
@@ -158,8 +164,25 @@ class Navigator:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What there is to say of the run: pauses, and what was made of them."""
-        return tuple(self._findings)
+        """What there is to say of the data and of pauses so far; `evaluation.verdict.of_live` judges the rest."""
+        part = self._record.part
+        return (*self._record.findings, *(part.findings(self._choice, self._recording) if part else ()))
+
+    @property
+    def measurements(self) -> dict[str, Innovations]:
+        """What became of the measurements so far, by kind, as in a `Solution`."""
+        return self._record.measurements(None if self._timeline is None else self._timeline.measured)
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """From when to when there are IMU data so far, s; None before there are any."""
+        newest = self._assembly.newest if self._starter is None else self._starter.newest_imu
+        return None if math.isnan(self._record.begin) else (self._record.begin, newest)
+
+    @property
+    def record(self) -> Record:
+        """What was counted so far."""
+        return self._record
 
     def _begin_from(self, start: Start) -> None:
         if len(start.imu_errors) != self._imus:
@@ -177,7 +200,7 @@ class Navigator:
         start, collected = found
         for kind, count in starter.counts.items():
             self.counts[kind] = self.counts.get(kind, 0) + count
-        self._findings += starter.findings
+        self._record.findings += starter.findings
         self._begin_from(start)
         for one in after_start(start, collected):
             self._take_sample(one)
@@ -205,6 +228,8 @@ class Navigator:
             return
         values = np.empty(6)
         values[:3], values[3:] = dtheta, dvel
+        if self._record.epochs == 0 and math.isnan(self._record.begin):
+            self._record.begin = time
         if not _finite(time, values):
             self._refuse(NOT_FINITE)
         elif self._starter is not None:
@@ -246,7 +271,7 @@ class Navigator:
         """Go on after a pause, which began at `last`, s, or anew if it was hopeless."""
         first = self._ahead.first
         held = self._ahead.in_order(self._recording.options.gnss_snap)
-        if first - last > restart.hopeless(self._recording.rig):
+        if first - last > restart.hopeless(self._recording.rig.has_wheels, self._has_fixes):
             self._begin_anew(last, first)
         else:
             self._assembly.newest = first
@@ -276,6 +301,10 @@ class Navigator:
             self._made.imu,
         )
         starter.after, starter.before = (last, first), before if lost else None
+        if line is not None:
+            self._record.findings = list(self.findings)
+            self._record.ended.append(line.measured)
+            self._record.part = None
         self._ended, self._timeline, self._schedule = line, None, None
         self._first, self._early, self.start = None, [], None
         self._assembly = Assembly(len(self._taken), self._made.wait, bridge=not self._recording.rig.has_wheels)
@@ -341,6 +370,7 @@ class Navigator:
             self._refuse(NO_STD)
         else:
             geodetic = self._recording.geodetic
+            self._has_fixes = True
             self._collect(GnssFix(time, place, std, speed, speed_std, geodetic=geodetic))
 
     def flush(self) -> None:
@@ -351,14 +381,14 @@ class Navigator:
         if starter is not None:
             self._collect(None)
             if self._starter is not None and starter.after is not None:
-                self._findings += [*starter.findings, restart.left_out(starter.after, starter.why)]
+                self._record.findings += [*starter.findings, restart.left_out(starter.after, starter.why)]
         self._step(at_end=True)
 
     @property
     def state(self) -> NavigatorState | None:
         """The state at the newest epoch; None before the first, and after a pause until there is a start again."""
         line = self._timeline
-        return None if line is None else _state(line, line.last)
+        return None if line is None else _states(line, line.last)[0]
 
     def history(self, after: float = -math.inf) -> list[NavigatorState]:
         """Return the states of all epochs later than `after`, s, as far back as a measurement may still come."""
@@ -367,7 +397,7 @@ class Navigator:
             return []
         begun = 1 if line.whole else 0
         first = int(np.searchsorted(line.inputs.time[: line.last + 1], after, side="right"))
-        return [_state(line, k) for k in range(max(first, begun), line.last + 1)]
+        return _states(line, max(first, begun))
 
     @property
     def health(self) -> tuple[ImuHealth, ...]:
@@ -401,15 +431,19 @@ class Navigator:
             counts=self.counts,
             first=self._first,
             due=due,
-            findings=tuple(self._findings),
+            findings=tuple(self._record.findings),
             fixes=self._has_fixes,
         )
-        checkpoint.write(Path(path), made, self._assembly, events.merged(*self._early), self._timeline)
+        line = {} if self._timeline is None else self._timeline.arrays()
+        early = events.merged(*self._early)
+        remembered = checkpoint.Remembered(self._assembly.arrays(), early, line, self._record.arrays())
+        checkpoint.write(Path(path), made, remembered)
 
     @classmethod
     def resume(cls, path: Path | str) -> Navigator:
         """Return the navigator that was saved; raise InputError for a file that is not whole or of another version."""
-        made, samples, early, line = checkpoint.read(Path(path))
+        made, remembered = checkpoint.read(Path(path))
+        early, line = remembered.early, remembered.line
         navigator = cls(
             made.rig,
             made.start,
@@ -421,12 +455,14 @@ class Navigator:
             wait=made.wait,
         )
         navigator.counts, navigator._first = made.counts, made.first
-        navigator._findings, navigator._has_fixes = list(made.findings), made.fixes
+        navigator._has_fixes = made.fixes
         navigator._early = [early.at(slice(row, row + 1)) for row in range(len(early.time))]
-        navigator._assembly.restore(samples)
+        navigator._assembly.restore(remembered.samples)
         if line:
             navigator._timeline = navigator._new_timeline(np.array([0.0, 1.0]), np.zeros((2, 6, len(navigator._taken))))
             navigator._timeline.restore(line)
+        navigator._record.restore(remembered.record)
+        navigator._record.findings = list(made.findings)
         if made.due is not None and navigator._schedule is not None:
             navigator._schedule.memory = made.due
         return navigator
@@ -447,6 +483,8 @@ class Navigator:
         if not _finite(time, values.ravel()):
             self._refuse(NOT_FINITE)
             return
+        if self._record.epochs == 0 and math.isnan(self._record.begin):
+            self._record.begin = time
         epoch = self._assembly.pass_through(time, values)
         if epoch is not None:
             self._take(epoch)
@@ -476,12 +514,17 @@ class Navigator:
         prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start, gaps=True)
         self._order, self._ended = prepared.order, None
         self._schedule = batch.schedule_of(self._choice, self._recording, self.start)
+        if math.isnan(self._record.interval):
+            self._record.interval = float(time[1] - time[0])
+        self._record.part = Part(Windows(self._recording.rig, 1.0 / float(time[1] - time[0])))
         return Timeline(prepared, self.delay)
 
     def _begin(self, first: Epoch, second: Epoch) -> None:
         increments = np.array([first.increments, second.increments])
         self._timeline = self._new_timeline(np.array([first.time, second.time]), increments)
         self._first = None
+        assert self._record.part is not None
+        self._record.part.take(first)
         early, self._early = self._early, []
         for event in early:
             self._refuse(self._aid(self._timeline, event))
@@ -505,16 +548,25 @@ class Navigator:
         if self._choice.speed:
             lacking, bias = (present == rigid.NOTHING)[None], self.start.imu_errors[:, :3]
             travel = wheels.travel(rig, self._choice.speed, increments[None], interval, lacking, bias)
-        stamp = np.array([epoch.time])
+        stamp, increments = np.array([epoch.time]), increments[:, self._order]
         assert self._schedule is not None
         due = self._schedule.events(stamp, interval, travel[:, 1])
-        line.append(
-            epoch.time,
-            increments[:, self._order],
-            present[self._order],
-            travel[0],
-            events.scheduled(due, stamp, self._recording.options, rig),
-        )
+        queue = events.scheduled(due, stamp, self._recording.options, rig)
+        if epoch.missing.all():
+            queue = events.merged(self._bridged(epoch.time, increments, line), queue)
+        line.append(epoch.time, increments, present[self._order], travel[0], queue)
+        assert self._record.part is not None
+        self._record.part.take(epoch)
+        self._record.take(epoch.time, line.outputs.states[line.last, 0:3])
+
+    def _bridged(self, time: float, increments: Array, line: Timeline) -> Events:
+        """Return the noise of an epoch in which no IMU has data."""
+        before = slice(max(line.last - 1, 0), line.last + 1)
+        times = np.append(line.inputs.time[before], time)
+        missing = np.zeros((len(times), 1), dtype=bool)
+        missing[-1] = True
+        rows = np.concatenate([line.inputs.increments[before], increments[None]])
+        return batch.bridged(self._recording.rig, times, rows, missing, self._recording.options.gnss_snap)
 
     def _measure(self, sample: Sample, *measurements: Events) -> None:
         """Take measurements of one time and one source: all or none; `sample` is what came."""
@@ -547,17 +599,30 @@ class Navigator:
         return BEFORE_START if line.whole else LATE
 
 
-def _state(line: Timeline, k: int) -> NavigatorState:
-    row, variances = line.outputs.states[k].copy(), line.outputs.variances[k].copy()
-    return NavigatorState(
-        time=float(line.inputs.time[k]),
-        position=row[0:3],
-        velocity=row[3:6],
-        attitude=row[6:10],
-        position_std=np.sqrt(variances[0:3]),
-        velocity_std=np.sqrt(variances[3:6]),
-        phi_covariance=variances[6:12],
+def _states(line: Timeline, first: int) -> list[NavigatorState]:
+    """Return the states at the epochs of a window from one on."""
+    here = slice(first, line.last + 1)
+    time, rows, variances = (
+        line.inputs.time[here],
+        line.outputs.states[here].copy(),
+        line.outputs.variances[here].copy(),
     )
+    time, position, velocity, attitude = line.inputs.time[here], rows[:, 0:3], rows[:, 3:6], rows[:, 6:10]
+    track = Trajectory(time, position, velocity, attitude, variances[:, 0:3], variances[:, 3:6], variances[:, 6:12])
+    status = status_of(track, line.aided, line.snap) if len(time) else ()
+    return [
+        NavigatorState(
+            time=float(time[k]),
+            position=position[k],
+            velocity=velocity[k],
+            attitude=attitude[k],
+            position_std=np.sqrt(variances[k, 0:3]),
+            velocity_std=np.sqrt(variances[k, 3:6]),
+            phi_covariance=variances[k, 6:12],
+            status=STATUSES[number],
+        )
+        for k, number in enumerate(status)
+    ]
 
 
 def _finite(time: float, values: Array) -> bool:

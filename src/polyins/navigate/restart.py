@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 from polyins.errors import InputError
 from polyins.model.findings import Finding
 from polyins.model.recording import GnssStream, ImuStream, Recording, StartOptions
-from polyins.model.rig import Imu, ImuErrors, Rig
+from polyins.model.rig import Imu, ImuErrors
 from polyins.model.solution import Solution
 from polyins.prepare.alignment import Start
 
 Array = NDArray[np.float64]
 
-HOPELESS, HOPELESS_ON_WHEELS = 1.5, 3.0
-"""s without data of any IMU, after which the state is found anew. Bridged by the rates on both sides, a second leaves
-the errors of an array within their std; two seconds make nine of them. Wheels cannot change their speed that fast."""
+HOPELESS, HOPELESS_ON_WHEELS, HOPELESS_BLIND = 1.0, 0.6, 3.0
+"""s without data of any IMU, after which the state is found anew: of an array; of wheels with GNSS, which coast; and
+without. What a vehicle may turn in that time, see `bridging`, is as much as a filter that is linear takes. Without
+fixes there is nothing to take, and nothing that would tell the heading again."""
 AGED = 1.5
 """times the std of IMU errors after a pause"""
 USUAL_SPEED = 10.0
@@ -57,14 +58,16 @@ class Known:
     """of each IMU by its name, and their std, (12,) each"""
 
 
-def hopeless(rig: Rig) -> float:
-    """Return how long no IMU may have data before the state is found anew, s."""
-    return HOPELESS_ON_WHEELS if rig.has_wheels else HOPELESS
+def hopeless(on_wheels: bool, fixes: bool) -> float:
+    """Return how long no IMU may have data before the state is found anew, s; `fixes`: whether there is GNSS."""
+    if not on_wheels:
+        return HOPELESS
+    return HOPELESS_ON_WHEELS if fixes else HOPELESS_BLIND
 
 
 def pauses(recording: Recording) -> list[tuple[float, float]]:
     """Return where no IMU has data for hopelessly long: the last stamp before and the first after, s."""
-    limit = hopeless(recording.rig)
+    limit = hopeless(recording.rig.has_wheels, recording.gnss is not None)
     common = [(-np.inf, np.inf)]
     for stream in recording.imus:
         edges = np.concatenate([[-np.inf], stream.time, [np.inf]])

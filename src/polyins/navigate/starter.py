@@ -85,6 +85,8 @@ class Starter:
         self.shown: list[SensorSample] = []
         """by sensors that say nothing of the start"""
         self.newest = self.newest_imu = float("-inf")
+        self.oldest = float("inf")
+        """s, of IMU data"""
         self.attempt: float | None = None
         """s: data up to this time are looked at next"""
 
@@ -101,12 +103,14 @@ class Starter:
             self.counts["late"] += 1
             return None
         if isinstance(sample, ImuSample):
-            if self.newest_imu > float("-inf") and sample.time - self.newest_imu > restart.hopeless(self.blank.rig):
+            longest = restart.hopeless(self.blank.rig.has_wheels, self.needs_fix or bool(self.fixes.stamps))
+            if self.newest_imu > float("-inf") and sample.time - self.newest_imu > longest:
                 found = self._from(self._found(self.newest_imu))
                 if found is not None:
                     return found[0], [*found[1], sample]
                 self._begin_anew(sample.time)
             self.newest_imu = max(self.newest_imu, sample.time)
+            self.oldest = min(self.oldest, sample.time)
         self.newest = max(self.newest, sample.time)
         rows.add(*_row(sample))
         if self.attempt is None:
