@@ -314,7 +314,11 @@ def live(config: Path, sources: tuple[str, ...], sinks: tuple[str, ...], speed: 
     sources, sinks = sources or run.Options.sources, sinks or run.Options.sinks
     settings = run.Options(config, sources=sources, sinks=sinks, speed=run.parse_speed(speed), **options)
     summary = run.run(settings)
-    say(f"{summary['stopped_by']}: {summary['status']}; files: {settings.out}")
+    say(f"{summary['stopped_by']}: {summary['status']}; verdict: {summary['verdict']['level']}; files: {settings.out}")
+    for finding in summary["verdict"]["findings"]:
+        if finding["severity"] != "note":
+            say(finding["text"])
+    _exit_by([summary["verdict"]["level"]])
 
 
 @cli.command()

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from playing import Event, events, feed, play, rows
 
 from polyins.evaluation.errors import compare_to_reference
 from polyins.model.attitude import euler_angles, euler_variance
 from polyins.model.recording import GnssStream, ImuStream, Recording
+from polyins.model.status import STATUSES
 from polyins.navigate import batch, restart
+from polyins.navigate.navigator import Navigator
 from polyins.simulation.run import simulate
 from polyins.simulation.scenario import Board, Scenario
 
@@ -58,9 +62,69 @@ def test_what_gives_no_start_is_left_out_and_named(drive: Recording) -> None:
     assert "what follows is left out" in finding.text
 
 
+def navigator(recording: Recording) -> Navigator:
+    return Navigator(recording.rig, recording.start, options=recording.options, delay=0.5)
+
+
+@pytest.mark.parametrize("length", [0.7, 2.0, 40.0])
+def test_live_a_pause_is_what_it_is_in_a_batch_run(drive: Recording, length: float) -> None:
+    recording = paused(drive, 60.0, 60.0 + length)
+    one, whole = navigator(recording), batch.run(recording, "enav-fusion")
+    states = play(one, recording, until(recording, 130.0))
+    time = np.array(list(states))
+    place = np.searchsorted(whole.time, time)
+    np.testing.assert_array_equal(whole.time[place], time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole)[place])
+    assert np.count_nonzero(time < 60.0) > 1000
+    assert np.count_nonzero(time > 60.0 + length) > 1000
+    assert {found.kind for found in whole.findings} == {"restart" if length > restart.HOPELESS else "gap"}
+    assert set(one.findings) == set(whole.findings)
+    for name, told in one.measurements.items():
+        expected = whole.measurements[name]
+        assert told.time.size > 60
+        for column in ("time", "residual", "nis", "accepted", "rows", "gained", "change"):
+            live, batched = getattr(told, column), getattr(expected, column)
+            np.testing.assert_array_equal(live, batched if batched is None else batched[: len(live)])
+    status = [STATUSES.index(state.status) for state in one.history()]
+    assert whole.status is not None
+    np.testing.assert_array_equal(status, whole.status[place[-1] + 1 - len(status) : place[-1] + 1])
+
+
+def until(recording: Recording, end: float) -> list[Event]:
+    return [event for event in events(recording) if event.arrives < end]
+
+
+@pytest.mark.parametrize("at", [55.0, 120.0])
+def test_a_checkpoint_is_resumed_after_the_pause(drive: Recording, at: float, tmp_path: Path) -> None:
+    """What lies between the checkpoint and the end of the pause is lost, or nothing is."""
+    recording = paused(drive, 60.0, 90.0)
+    whole = navigator(recording)
+    played = until(recording, 130.0)
+    for event in played:
+        feed(whole, recording, event)
+    first = navigator(recording)
+    for event in played:
+        if event.arrives < at:
+            feed(first, recording, event)
+    first.save(tmp_path / "checkpoint")
+    saved = Navigator.resume(tmp_path / "checkpoint")
+    for event in played:
+        if event.arrives >= (at if at > 90.0 else 90.0):
+            feed(saved, recording, event)
+    (found,) = [one for one in saved.findings if one.kind == "restart"]
+    assert found.from_s == pytest.approx(min(at, 60.0), abs=0.05)
+    state, expected = saved.state, whole.state
+    assert state is not None
+    assert expected is not None
+    assert state.time == expected.time
+    if at > 90.0:
+        np.testing.assert_array_equal(state.position, expected.position)
+    np.testing.assert_allclose(state.velocity, expected.velocity, atol=0.2)
+
+
 def test_a_pause_of_some_or_a_short_one_is_none(drive: Recording) -> None:
     assert restart.pauses(drive) == []
     assert restart.pauses(paused(drive, 100.0, 150.0, (0, 1))) == []
-    assert restart.pauses(paused(drive, 100.0, 105.0)) == []
+    assert restart.pauses(paused(drive, 100.0, 100.9)) == []
     (one,) = restart.pauses(paused(drive, 100.0, 150.0))
     np.testing.assert_allclose(one, (100.0, 150.0), atol=0.03)

@@ -21,7 +21,8 @@ from polyins.kernels.jit import Array, scalar_kernel
     HEADING,
     ODOMETER,
     WINDOW,
-) = range(10)
+    PAUSE,
+) = range(11)
 
 MEAN: Final = 0
 EACH: Final = 1
@@ -62,6 +63,8 @@ KINDS = (
     Kind("odometer", "m/s", FORWARD_RIGHT_DOWN, deweights=True, in_vehicle=True, offset="speed_scale"),
     # not a measurement: from here on the mean speed of the next one is taken
     Kind("window", "", ()),
+    # nor is this: no IMU had data until now, see `navigate.bridging`
+    Kind("pause", "", ()),
 )
 
 JOINED = tuple(kind.joined for kind in KINDS)

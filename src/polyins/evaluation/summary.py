@@ -77,7 +77,7 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
         },
         "start": solution.start,
         "verdict": judged.document(),
-        "coverage": coverage(solution, figures.epochs),
+        "coverage": coverage(solution.recording_span, figures.epochs),
         "exclusions": [
             {"imu": one.stream, "from_s": one.from_s, "to_s": one.to_s, "cause": one.text, "statistic": None}
             for one in judged.findings

@@ -6,8 +6,9 @@ sign, it is not kept.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from polyins.evaluation.outages import partly_covered
 from polyins.evaluation.receiver import of_receiver
 from polyins.model.findings import Finding, Severity, Verdict
 from polyins.model.solution import Innovations, Solution
+
+if TYPE_CHECKING:
+    from polyins.navigate.navigator import Navigator
 
 Array = NDArray[np.float64]
 
@@ -55,22 +59,32 @@ class _Statistics:
 
 def verdict(solution: Solution, figures: Figures) -> Verdict:
     """Return what is to be said of a solution; of it only what has no row per epoch is looked at."""
-    known = (*solution.findings, *of_measurements(solution))
-    return Verdict((*known, *_of_epochs(solution, figures.epochs), *_of_reference(figures)))
+    known = (*solution.findings, *of_measurements(solution.measurements))
+    return Verdict((*known, *_of_epochs(solution.recording_span, figures.epochs), *_of_reference(figures)))
 
 
-def of_measurements(solution: Solution) -> tuple[Finding, ...]:
-    """Return what the innovations of a solution say of it."""
-    return tuple(
-        finding for kind, measured in solution.measurements.items() for finding in _of_kind(kind, measured.used())
-    )
+def of_live(navigator: Navigator, findings: Sequence[Finding] = ()) -> Verdict:
+    """Return what is to be said of what a navigator has done so far; `findings`: of its configuration."""
+    known = (*findings, *navigator.findings, *of_measurements(navigator.measurements))
+    return Verdict((*known, *_of_epochs(navigator.span, counted(navigator))))
 
 
-def _of_epochs(solution: Solution, epochs: Epochs) -> Iterator[Finding]:
+def counted(navigator: Navigator) -> Epochs:
+    """Return how many epochs a navigator has taken so far."""
+    record = navigator.record
+    return Epochs(record.first, record.last, record.epochs, record.interval, record.broken)
+
+
+def of_measurements(measurements: Mapping[str, Innovations]) -> tuple[Finding, ...]:
+    """Return what the innovations of a run, by kind, say of it."""
+    return tuple(finding for kind, measured in measurements.items() for finding in _of_kind(kind, measured.used()))
+
+
+def _of_epochs(span: tuple[float, float] | None, epochs: Epochs) -> Iterator[Finding]:
     if epochs.broken:
         text = f"the solution is not finite at {epochs.broken} of {epochs.count} epochs: it diverged"
         yield Finding("not finite", text, "serious", from_s=epochs.first, to_s=epochs.last, size=epochs.broken)
-    share = coverage(solution, epochs)["of_recording"]
+    share = coverage(span, epochs)["of_recording"]
     if share is not None and share < LEAST_COVERAGE:
         yield Finding(
             "coverage",
@@ -82,9 +96,8 @@ def _of_epochs(solution: Solution, epochs: Epochs) -> Iterator[Finding]:
         )
 
 
-def coverage(solution: Solution, epochs: Epochs) -> CoverageFigures:
-    """Return from when to when there is a solution, and which share of the recording that is, if it is known."""
-    span = solution.recording_span
+def coverage(span: tuple[float, float] | None, epochs: Epochs) -> CoverageFigures:
+    """Return from when to when there is a solution, and which share of a recording of that span, s, if it is known."""
     known = span is not None and span[1] > span[0]
     share = min(1.0, (epochs.duration + epochs.interval) / (span[1] - span[0])) if span is not None and known else None
     return {"from_s": epochs.first, "to_s": epochs.last, "of_recording": share}

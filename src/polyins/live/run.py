@@ -32,6 +32,7 @@ from polyins.live.session import Checkpoints, Session
 from polyins.live.sinks import Outlet, ParquetLog, open_sink
 from polyins.live.source import POLL, RefusedError, Source
 from polyins.live.sources import open_source
+from polyins.model.findings import notes
 from polyins.model.methods import find_method
 from polyins.model.recording import Recording
 from polyins.navigate import choice
@@ -91,7 +92,7 @@ def run(options: Options) -> dict[str, Any]:
     Raises InputError for a configuration, source or sink that cannot be right, and for data that end without a start.
     """
     config, document, warnings = loading.read_config(options.config)
-    recording, notes = _recording(options, config, document)
+    recording, said = _recording(options, config, document)
     method = find_method(options.method or choice.usual_method(recording.rig)).name
     make_folder(options.out)
     session = _session(options, config, recording, method)
@@ -99,7 +100,7 @@ def run(options: Options) -> dict[str, Any]:
         live = Live(session, _sources(options, config, recording, session), stopped)
         live.open_outlets(options, method, config)
         live.run()
-    summary = live.summary(method, (*warnings, *notes))
+    summary = live.summary(method, (*warnings, *said))
     write_document(options.out / "summary.json", summary)
     if session.navigator is None and not live.stopped_by:
         raise InputError(f"{options.config}: the data ended without a start: {session.starter.why}")
@@ -204,6 +205,7 @@ class Live:
         names = [imu.name for imu in rig.imus] + [sensor.kind for sensor in rig.sensors]
         report = session.report()
         checkpoints = session.checkpoints.count if session.checkpoints else 0
+        judged = session.judged(notes(warnings))
         return {
             "polyins": __version__,
             "method": method,
@@ -219,7 +221,10 @@ class Live:
             "imus": report.get("imus", []),
             "checkpoints": checkpoints,
             "files": [path.name for path in self.files if path.is_file()],
-            "warnings": list(warnings),
+            "verdict": judged.document(),
+            "coverage": session.coverage,
+            "faults": judged.faults,
+            "warnings": judged.warnings,
         }
 
 

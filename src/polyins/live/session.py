@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polyins.evaluation.documents import CoverageFigures
+from polyins.evaluation.verdict import counted, coverage, of_live
 from polyins.files import write_bytes
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
+from polyins.model.findings import TRUST, Finding, Level, Verdict
 from polyins.navigate.samples import Array, ImuSample, Sample, SensorSample
 from polyins.navigate.starter import Starter, after_start
 from polyins.prepare.alignment import Start
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
 
 SILENT_GNSS = 2.0
 """s without a fix that are dead reckoning; at least, and 2.5 times the usual interval"""
+JUDGED_EVERY, JUDGED_SHARE = 5.0, 0.01
+"""s of data between two verdicts that are told under way, and of a long run at least that share of it"""
 LONGEST_LAG = 1.0
 """s by which a state is taken to follow the stamp of what has come"""
 
@@ -70,10 +75,13 @@ class Session:
         self.due = float("-inf")
         """s: a state is looked at when a stamp has come that far"""
         self.last: Snapshot | None = None
+        self.level, self.judged_until = TRUST, float("-inf")
+        """of the last verdict, and until when it is told, s"""
 
     def resume(self, navigator: Navigator, origin: Array) -> None:
         """Go on with a navigator from a checkpoint instead of looking for a start."""
         self.navigator, self.origin = navigator, origin
+        navigator.caught_up = self._caught_up
         if navigator.state is not None:
             self.fix_times.append(navigator.state.time)  # what it knows, a fix would have said
 
@@ -86,6 +94,9 @@ class Session:
 
     def _begin(self, start: Start, collected: list[Sample]) -> None:
         self.start, self.navigator = start, self.begin(start)
+        self.navigator.caught_up = self._caught_up
+        self.navigator.record.begin = self.starter.oldest
+        self.navigator.record.findings += self.starter.findings
         self.fix_times.append(start.time)  # what the start knows, a fix would have said
         for one in after_start(start, collected):
             self._feed(one)
@@ -100,7 +111,7 @@ class Session:
         state = self.navigator.state
         if state is not None and (self.last is None or state.time > self.last.state.time):
             self._pass_on(state, last=True)
-        if self.checkpoints is not None and self.checkpoints.every < float("inf"):
+        if self.checkpoints is not None and self.checkpoints.every < float("inf") and not self.navigator.waits_for:
             self.navigator.save(self.checkpoints.path)
 
     def _feed(self, sample: Sample) -> None:
@@ -125,6 +136,9 @@ class Session:
         else:
             self.samples["GNSS"] += 1
             self.fix_times.append(sample.time)
+        self._caught_up(sample)
+
+    def _caught_up(self, sample: Sample) -> None:
         if sample.time >= self.due:
             self._look(sample.time)
 
@@ -160,14 +174,38 @@ class Session:
 
     def report(self) -> dict[str, Any]:
         """Return how it goes: state, health of each IMU, age of the last fix."""
-        if self.navigator is None or self.last is None:
-            return {"status": f"looking for a start: {self.starter.why}"}
+        missing = self.starter.why if self.navigator is None else self.navigator.waits_for
+        if self.navigator is None or self.last is None or missing:
+            return {"status": f"looking for a start: {missing}"}
         return {
+            "verdict": self._level(self.last.state.time),
             "status": "dead reckoning" if self.last.dead_reckoning else "navigating",
             "state": self.last.row,
             "imus": [_health(one) for one in self.navigator.health],
             "fix_age_s": self.last.state.time - max(self.fix_times) if self.fix_times else None,
         }
+
+    def judged(self, findings: Sequence[Finding]) -> Verdict:
+        """Return the verdict on the run so far; `findings`: of its configuration."""
+        if self.navigator is not None and self.navigator.record.epochs:
+            return of_live(self.navigator, findings)
+        text = f"no start was found: {self.starter.why if self.navigator is None else self.navigator.waits_for}"
+        return Verdict((*findings, Finding("start", text, "serious")))
+
+    @property
+    def coverage(self) -> CoverageFigures | None:
+        """From when to when there are states; None without any."""
+        if self.navigator is None or not self.navigator.record.epochs:
+            return None
+        return coverage(self.navigator.span, counted(self.navigator))
+
+    def _level(self, time: float) -> Level:
+        """Return the level of the verdict, which is looked at now and then: it takes as long as the run is long."""
+        if time >= self.judged_until:
+            begin = time if self.navigator is None else self.navigator.record.first
+            self.level = self.judged(()).level
+            self.judged_until = time + max(JUDGED_EVERY, JUDGED_SHARE * (time - begin))
+        return self.level
 
     def refused(self) -> Counter[str]:
         """Return what starter and navigator refused, by kind."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polyins.formats.solution_files import trajectory_columns
 from polyins.model.solution import Trajectory
-from polyins.model.status import STATUSES, status_of
+from polyins.model.status import STATUSES
 
 if TYPE_CHECKING:
     from polyins.navigate.navigator import NavigatorState
@@ -38,13 +38,12 @@ class Snapshot:
             name: None if values is None else float(values[0])
             for name, values in columns([self.state], self.origin, self.geodetic).items()
         }
-        return {**figures, "dead_reckoning": self.dead_reckoning, "status": STATUSES[self.status]}
+        return {**figures, "dead_reckoning": self.dead_reckoning, "status": self.state.status}
 
     @cached_property
     def status(self) -> int:
         """What the state is worth, an index into `STATUSES`."""
-        aided = np.array([-np.inf if self.dead_reckoning else self.state.time])
-        return int(status_of(_stacked([self.state]), aided, 0.0)[0])
+        return STATUSES.index(self.state.status)
 
 
 def columns(states: Sequence[NavigatorState], origin: Array, geodetic: bool) -> dict[str, Array | None]:

@@ -21,19 +21,30 @@ LEAST_COASTING = 2.0
 USUAL_INTERVALS = 2.5
 
 
-def patience(intervals: Array) -> float:
-    """Return how long after the last measurement a state is still tracking, s, of the usual intervals between them."""
-    return max(LEAST_COASTING, USUAL_INTERVALS * float(np.median(intervals)) if len(intervals) else 0.0)
+USUAL = 5
+"""latest intervals between measurements whose median is the usual one"""
 
 
-def status_of(trajectory: Trajectory, aided: Array, usual: float) -> NDArray[np.uint8]:
+def patience(times: Array) -> Array:
+    """Return how long after each of some measurements a state is still tracking, s, of the intervals up to it."""
+    intervals = np.diff(times)
+    usual = np.zeros(len(times))
+    if len(intervals):
+        known = np.concatenate([np.full(USUAL - 1, intervals[0]), intervals])
+        usual[1:] = np.median(np.lib.stride_tricks.sliding_window_view(known, USUAL), axis=1)
+    return np.maximum(LEAST_COASTING, USUAL_INTERVALS * usual)
+
+
+def status_of(trajectory: Trajectory, times: Array, snap: float = 0.0) -> NDArray[np.uint8]:
     """Return the index of the status at each epoch, shape (T,).
 
-    `aided`: s, when a position or a speed was last accepted, shape (T,); `usual`: how long it may be ago, s.
+    `times`: when a position or a speed was accepted, from before the first epoch on, s; one that is later than an epoch
+    by no more than `snap`, s, is at it.
     """
+    last = np.maximum(np.searchsorted(times, trajectory.time + snap, "right") - 1, 0)
     found = np.full(len(trajectory.time), TRACKING, dtype=np.uint8)
     with np.errstate(invalid="ignore"):
-        found[trajectory.time - aided > usual] = COASTING
+        found[trajectory.time - times[last] > patience(times)[last]] = COASTING
         found[np.sqrt(trajectory.position_variance[:, :2].max(axis=1)) > LOST_STD] = ATTITUDE_ONLY
         found[np.sqrt(trajectory.phi_covariance[:, 5]) > ALIGNED_STD] = ALIGNING
     finite = np.isfinite(trajectory.position).all(axis=1) & np.isfinite(trajectory.attitude).all(axis=1)

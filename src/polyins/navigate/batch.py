@@ -10,16 +10,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.aiding import kinds
 from polyins.errors import InputError
-from polyins.kernels import dense
+from polyins.kernels import bank, covariance, dense
+from polyins.kernels.bank import LANES
+from polyins.model.attitude import euler_angles
 from polyins.model.findings import SILENT, Finding, notes
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
-from polyins.model.solution import Innovations, OffsetEstimate, Solution, Trajectory
+from polyins.model.rig import Rig
+from polyins.model.solution import OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
-from polyins.model.status import patience, status_of
-from polyins.navigate import engine, events, layout, receiver, restart, update
+from polyins.model.status import USUAL, status_of
+from polyins.navigate import bridging, engine, events, layout, outcome, restart
 from polyins.navigate import start as search
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
@@ -33,10 +35,8 @@ from polyins.prepare.timesync import Aligned
 
 Array = NDArray[np.float64]
 
-AIDING = (kinds.GNSS_POSITION, kinds.WHEEL_SPEED, kinds.ODOMETER)
-"""kinds without which a run coasts"""
-USUAL_AIDING = 6
-"""latest of them that tell how often they usually come"""
+USUAL_AIDING = 1 + USUAL
+"""latest positions and speeds, which tell how often they usually come"""
 
 CHUNK = 4000
 """Epochs between two calls of `progress`."""
@@ -110,13 +110,41 @@ def run(
 ) -> Solution:
     """Navigate a recording with one method and return its solution.
 
-    After a pause in which no IMU of an array has data the state is found anew, see `restart`. `imu` is the index of
-    the IMU that `single` uses. `progress` is called with the share of epochs done. Raises InputError for a method that
-    is unknown or data that give no start.
+    After a pause in which no IMU has data the state is found anew, see `restart`. `imu` is the index of the IMU that
+    `single` uses. `progress` is called with the share of epochs done. Raises InputError for a method that is unknown or
+    data that give no start.
     """
-    if restart.pauses(recording):
-        return restart.run_parts(recording, lambda part: navigate(prepare(part, method, imu=imu), progress))
-    return navigate(prepare(recording, method, imu=imu), progress)
+    taken = choose(find_method(method), recording.rig, imu).all
+    pauses = restart.pauses(recording.subset(taken))
+    if not pauses:
+        return navigate(prepare(recording, method, imu=imu), progress)
+
+    def of_part(part: Recording, before: restart.Known | None) -> tuple[Solution, restart.Known]:
+        prepared = prepare(part, method, imu=imu, before=before)
+        return navigate(prepared, progress), known(prepared, -1)
+
+    return restart.run_parts(recording, pauses, of_part)
+
+
+def known(run: Prepared, last: int) -> restart.Known:
+    """Return what a run knows which has taken all epochs up to its row `last`."""
+    state, stride = run.state, int(run.plan.settings[places.STRIDE])
+    row, variance = run.outputs.states[last], run.outputs.variances[last]
+    errors = {}
+    for s, (begin, end) in enumerate(run.bank.spans):
+        std = np.sqrt([covariance.variance(state.blocks[s], covariance.NAV + k, stride) for k in range(IMU_ERRORS)])
+        for lane in range(begin, end):
+            first = bank.ERRORS + lane % LANES
+            own = state.rows[lane // LANES, first : first + IMU_ERRORS * LANES : LANES].copy()
+            errors[run.bank.members[lane].imu.name] = own, std
+    return restart.Known(
+        time=float(run.inputs.time[last]),
+        position=row[0:3].copy(),
+        velocity=row[3:6].copy(),
+        heading=float(euler_angles(row[None, 6:10])[0, 2]),
+        position_std=np.sqrt(variance[0:3]),
+        imu_errors=errors,
+    )
 
 
 def navigate(prepared: Prepared, progress: Callable[[float], None] | None = None) -> Solution:
@@ -147,10 +175,18 @@ def _check_finite(run: Prepared) -> None:
         )
 
 
-def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance: bool = False) -> Prepared:
+def prepare(
+    recording: Recording,
+    method: str,
+    *,
+    imu: int = 0,
+    dense_covariance: bool = False,
+    before: restart.Known | None = None,
+) -> Prepared:
     """Lay a run out, as `run` does before its first epoch.
 
-    The dense covariance is the papers' form with full matrices, there to be compared with.
+    `before`: what was known before the pause that the recording follows. The dense covariance is the papers' form with
+    full matrices, there to be compared with.
     """
     row = find_method(method)
     choice = choose(row, recording.rig, imu)
@@ -159,6 +195,8 @@ def prepare(recording: Recording, method: str, *, imu: int = 0, dense_covariance
     of_them = of_data(recording, aligned, float(aligned.time[-1]))
     aligned = replace(aligned, findings=(*aligned.findings, *of_them))
     start = start_of(row, recording, aligned)
+    if before is not None and restart.is_lost(recording):
+        start = restart.as_lost(start, before)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
     if len(aligned.time) < 2:
@@ -249,8 +287,18 @@ def inputs_of(run: Prepared, aligned: Aligned, begin: float) -> Inputs:
     shown = events.of_recording(run.recording, begin, float(aligned.time[-1]) + options.gnss_snap)
     lateral = travel[1:, 1] if len(travel) else np.zeros(len(intervals) - 1)
     due = run.schedule.events(aligned.time[1:], intervals[1:], lateral)
-    queue = events.merged(events.scheduled(due, aligned.time[1:], options, rig), shown)
-    return Inputs(aligned.time, np.ascontiguousarray(whole.increments[:, :, run.order]), present, travel, *queue)
+    increments = np.ascontiguousarray(whole.increments[:, :, run.order])
+    unknown = bridged(rig, aligned.time, increments, missing, options.gnss_snap)
+    queue = events.merged(unknown, events.scheduled(due, aligned.time[1:], options, rig), shown)
+    return Inputs(aligned.time, increments, present, travel, *queue)
+
+
+def bridged(rig: Rig, time: Array, increments: Array, missing: NDArray[np.bool_], snap: float) -> Events:
+    """Return the noise of epochs in which no IMU has data; the first row of the epochs was taken before."""
+    nothing = np.asarray(missing.all(axis=1))
+    if rig.has_wheels:
+        return bridging.of_wheels(time, nothing, snap)
+    return bridging.of_array(time, increments, nothing, snap)
 
 
 def present_of(recording: Recording, missing: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -297,6 +345,9 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
     point = recording.rig.imus[0].position if run.method.bank == "one" and not recording.rig.has_wheels else np.zeros(3)
     lanes = run.bank.lanes
     log = outputs.log[:, :, :, lanes].transpose(0, 1, 3, 2)
+    rows = outcome.rows_of(run.inputs, outputs, slice(None), len(run.inputs.time) - 1)
+    aided = np.concatenate([run.aided, outcome.aided_at(rows)])
+    run.aided[:] = aided[-USUAL_AIDING:]
     return Solution(
         method=run.method.name,
         geodetic=recording.geodetic,
@@ -307,14 +358,14 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         imu_error_time=outputs.log_time,
         imu_errors=log[:, 0, :, :12],
         imu_error_std=log[:, 1, :, :12],
-        measurements=innovations_of(run),
+        measurements=outcome.innovations_of(rows),
         offsets=offsets_of(run, lanes),
         mounting=log[:, 0, :, 12:15] if recording.rig.has_wheels else None,
         mounting_std=log[:, 1, :, 12:15] if recording.rig.has_wheels else None,
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,
-        status=_status(run, track),
+        status=status_of(track, aided, recording.options.gnss_snap),
         recording_span=_span(recording),
         findings=(
             *notes(recording.warnings),
@@ -325,61 +376,9 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
     )
 
 
-def _status(run: Prepared, track: Trajectory) -> NDArray[np.uint8]:
-    """Return what each state is worth, and note when the run was aided last."""
-    kind, taken = run.inputs.event_kind, run.outputs.event_status
-    believed = np.isin(kind, AIDING) & np.isin(taken, (update.ACCEPTED, update.RESET))
-    times = np.concatenate([run.aided, run.inputs.event_time[believed]])
-    last = np.maximum(np.searchsorted(times, track.time + run.recording.options.gnss_snap, "right") - 1, 0)
-    found = status_of(track, times[last], patience(np.diff(times)))
-    run.aided[:] = times[-USUAL_AIDING:]
-    return found
-
-
 def _span(recording: Recording) -> tuple[float, float] | None:
     stamps = [stream.time[[0, -1]] for stream in recording.imus if stream.time.size]
     return (float(np.min(stamps)), float(np.max(stamps))) if stamps else None
-
-
-def innovations_of(run: Prepared) -> dict[str, Innovations]:
-    """Return what became of the measurements, by kind; of GNSS positions in any case."""
-    queue, outputs = Events(*run.inputs[4:8]), run.outputs
-    velocity = np.flatnonzero(queue.kind == kinds.GNSS_VELOCITY)
-    lost = queue.time[velocity][outputs.event_status[velocity] != update.ACCEPTED]
-    found = {}
-    for number, kind in enumerate(kinds.KINDS):
-        shown = np.flatnonzero((queue.kind == number) & (outputs.event_status != update.UNUSED))
-        if number == kinds.GNSS_POSITION:
-            shown = np.flatnonzero(queue.kind == number)
-        elif not len(shown) or not kind.axes:
-            continue
-        status, rows, axes = outputs.event_status[shown], outputs.innovations[shown], len(kind.axes)
-        of_fix = number == kinds.GNSS_POSITION
-        found[kind.name] = Innovations(
-            time=queue.time[shown],
-            residual=rows[:, :axes],
-            std=np.sqrt(rows[:, 3 : 3 + axes]),
-            nis=rows[:, 6],
-            accepted=np.isin(status, (update.ACCEPTED, update.RESET)),
-            reset=status == update.RESET,
-            velocity_rejected=np.isin(queue.time[shown], lost) if of_fix else np.zeros(len(shown), dtype=bool),
-            change=rows[:, receiver.D : receiver.D + axes] if of_fix else None,
-            noise_ratio=rows[:, receiver.NOISE] if of_fix else None,
-            gained=_gained(run, queue.time[shown]) if of_fix else None,
-            rows=(queue.variance[shown] > 0.0).sum(axis=1),
-            axes=kind.axes,
-            unit=kind.unit,
-        )
-    return found
-
-
-def _gained(run: Prepared, time: Array) -> Array:
-    """Return what the velocity gained from fix to fix, up to the epoch before each: none of it is from the fixes."""
-    at = np.clip(np.searchsorted(run.inputs.time, time), 1, len(run.inputs.time) - 1)
-    velocity = run.outputs.states[:, 3:6]
-    gained = np.zeros((len(time), 3))
-    gained[1:] = velocity[np.maximum(at[1:] - 1, at[:-1])] - velocity[at[:-1]]
-    return gained
 
 
 def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, OffsetEstimate]:
@@ -397,7 +396,7 @@ def silences(choice: Choice, recording: Recording, aligned: Aligned) -> tuple[Fi
     """Return which IMUs were silent for how long, of a choice and what became of them."""
     found = []
     for i, imu in enumerate(recording.rig.imus):
-        for first, end in _stretches(aligned.missing[:, i]):
+        for first, end in stretches(aligned.missing[:, i]):
             begin, last = aligned.time[max(first - 1, 0)], aligned.time[end - 1]
             outcome = _outcome(choice, i, aligned, first, end)
             begin, last = float(begin), float(last)
@@ -426,6 +425,7 @@ def _outcome(choice: Choice, i: int, aligned: Aligned, first: int, end: int) -> 
     return "the others carried it along"
 
 
-def _stretches(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def stretches(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return where something holds: the first of each stretch and the one after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(int), [0]])))
     return [(int(first), int(end)) for first, end in zip(edges[::2], edges[1::2], strict=True)]

@@ -18,21 +18,20 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.files import write_bytes
+from polyins.model.findings import Finding
 from polyins.model.recording import FilterOptions
 from polyins.model.rig import Rig
 from polyins.navigate.events import Events
 from polyins.prepare.alignment import Start
-from polyins.prepare.assembly import Assembly, Epoch
+from polyins.prepare.assembly import Epoch
 from polyins.version import __version__
 
 if TYPE_CHECKING:
     from cattrs import Converter
 
-    from polyins.navigate.timeline import Timeline
-
 Arrays = dict[str, NDArray[Any]]
 
-MADE, SAMPLES, EARLY, LINE = "made", "samples.", "early.", "line."
+MADE, SAMPLES, EARLY, LINE, RECORD = "made", "samples.", "early.", "line.", "record."
 
 
 @dataclass(frozen=True)
@@ -55,23 +54,40 @@ class Made:
     """of which the run begins, as long as there is only one"""
     due: tuple[float, float, float, bool] | None
     """what the schedule of its own measurements remembers"""
+    findings: tuple[Finding, ...] = ()
+    """of the parts before pauses, and of those"""
+    fixes: bool = False
+    """whether there were any"""
 
 
-def write(path: Path, made: Made, assembly: Assembly, early: Events, timeline: Timeline | None) -> None:
-    """Write a navigator to a file, which is whole or absent; `early` came before its first epoch."""
+@dataclass(frozen=True)
+class Remembered:
+    """What a navigator remembers, as arrays."""
+
+    samples: Arrays
+    """of its assembly"""
+    early: Events
+    """that came before its first epoch"""
+    line: Arrays
+    """of its timeline; empty without one"""
+    record: Arrays
+
+
+def write(path: Path, made: Made, remembered: Remembered) -> None:
+    """Write a navigator to a file, which is whole or absent."""
     text = json.dumps(_converter().unstructure(made))
     arrays: Arrays = {MADE: np.frombuffer(text.encode(), dtype=np.uint8)}
-    arrays |= {SAMPLES + name: array for name, array in assembly.arrays().items()}
-    arrays |= {EARLY + name: array for name, array in early._asdict().items()}
-    if timeline is not None:
-        arrays |= {LINE + name: array for name, array in timeline.arrays().items()}
+    arrays |= {SAMPLES + name: array for name, array in remembered.samples.items()}
+    arrays |= {EARLY + name: array for name, array in remembered.early._asdict().items()}
+    arrays |= {LINE + name: array for name, array in remembered.line.items()}
+    arrays |= {RECORD + name: array for name, array in remembered.record.items()}
     content = io.BytesIO()
     np.savez(content, allow_pickle=False, **arrays)
     write_bytes(path, content.getvalue())
 
 
-def read(path: Path) -> tuple[Made, Arrays, Events, Arrays]:
-    """Return what `write` was given, assembly and timeline as arrays; raise InputError for any other file."""
+def read(path: Path) -> tuple[Made, Remembered]:
+    """Return what `write` was given; raise InputError for any other file."""
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays: Arrays = dict(file)
@@ -81,7 +97,8 @@ def read(path: Path) -> tuple[Made, Arrays, Events, Arrays]:
     if values["polyins"] != __version__:
         raise InputError(f"{path}: of polyins {values['polyins']}; expected one of {__version__}")
     early = Events(**_named(EARLY, arrays))
-    return _converter().structure(values, Made), _named(SAMPLES, arrays), early, _named(LINE, arrays)
+    remembered = Remembered(_named(SAMPLES, arrays), early, _named(LINE, arrays), _named(RECORD, arrays))
+    return _converter().structure(values, Made), remembered
 
 
 def _named(prefix: str, arrays: Arrays) -> Arrays:
@@ -95,6 +112,7 @@ def _converter() -> Converter:
     converter = Converter()
     converter.register_unstructure_hook_func(_is_array, lambda array: array.tolist())
     converter.register_structure_hook_func(_is_array, lambda value, _: np.array(value))
+    converter.register_structure_hook_func(lambda kind: kind == float | str | None, lambda value, _: value)
     return converter
 
 

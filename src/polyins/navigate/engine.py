@@ -215,6 +215,8 @@ def aid(navigators: Navigators, further: Further | None, inputs: Inputs, outputs
     status = update.UNUSED
     if kind == kinds.WINDOW:
         window.open_at(state, plan, state.scalars[TIME], measurement[VALUE])
+    elif kind == kinds.PAUSE:
+        silence.add_noise(state, plan, measurement[VALUE : VALUE + 4])
     elif _complete(state, plan, measurement, kind):
         status = update.apply(state, plan, work, further, outputs.innovations[j])
     if kind == kinds.GNSS_POSITION:

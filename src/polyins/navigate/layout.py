@@ -118,7 +118,7 @@ def lay_out(
     if joined and row.bank == "all":
         _share_start(state, count, stride)
     _fill_scalars(state.scalars, recording, start)
-    state.silent[:] = -1.0
+    state.silent[:2] = -1.0
     plan = _plan(row, choice, seats, recording, rows, stride)
     return memory, Navigators(state, plan, empty_work(count, joined))
 

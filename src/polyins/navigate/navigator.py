@@ -6,6 +6,7 @@ A recording that is played through it gives the solution of a batch run, bit for
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,25 +16,32 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.aiding import kinds
 from polyins.errors import InputError
 from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.findings import Finding
 from polyins.model.methods import find_method
 from polyins.model.recording import AidingStream, FilterOptions, Recording, StartOptions
 from polyins.model.rig import Rig
-from polyins.navigate import batch, checkpoint, events
+from polyins.model.solution import Innovations, Trajectory
+from polyins.model.status import STATUSES, status_of
+from polyins.navigate import batch, checkpoint, events, restart
+from polyins.navigate.ahead import Ahead, Increments, Measured
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
+from polyins.navigate.record import Part, Record
 from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.starter import Starter, after_start
 from polyins.navigate.timeline import Timeline
 from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
-from polyins.prepare.assembly import DUPLICATED, FUTURE_STAMPED, LATE, Assembly, Epoch
+from polyins.prepare.assembly import DUPLICATED, FUTURE, FUTURE_STAMPED, LATE, Assembly, Epoch
 from polyins.prepare.timesync import Aligned
+from polyins.prepare.votes import Windows
 from polyins.version import __version__
 
 Array = NDArray[np.float64]
 
 NOT_FINITE, BEFORE_START, NO_STD = "not finite", "before the start", "std not positive"
+IN_PAUSE = "without IMU data"
 HEALTH_WINDOW = 1.0  # s
 
 
@@ -55,6 +63,8 @@ class NavigatorState:
     """m/s, shape (3,)"""
     phi_covariance: Array
     """rad^2: NN, NE, ND, EE, ED, DD of the attitude error phi, shape (6,)"""
+    status: str
+    """what it is worth, one of `model.status.STATUSES`"""
 
     @property
     def euler(self) -> Array:
@@ -131,6 +141,13 @@ class Navigator:
         """measurements that came before the first epoch"""
         self.counts: dict[str, int] = {}
         """what was refused, by kind"""
+        self._ahead = Ahead()
+        self._record = Record()
+        self._ended: Timeline | None = None
+        """of the part before a pause, until the part after it has one"""
+        self._has_fixes = False
+        self.caught_up: Callable[[Sample], None] | None = None
+        """called after each of the samples that were collected before a start, with it"""
         self._starter: Starter | None = None
         if isinstance(start, Start):
             self._begin_from(start)
@@ -144,6 +161,28 @@ class Navigator:
     def waits_for(self) -> str:
         """Why there is no start yet; empty once there is one."""
         return "" if self._starter is None else self._starter.why
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What there is to say of the data and of pauses so far; `evaluation.verdict.of_live` judges the rest."""
+        part = self._record.part
+        return (*self._record.findings, *(part.findings(self._choice, self._recording) if part else ()))
+
+    @property
+    def measurements(self) -> dict[str, Innovations]:
+        """What became of the measurements so far, by kind, as in a `Solution`."""
+        return self._record.measurements(None if self._timeline is None else self._timeline.measured)
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """From when to when there are IMU data so far, s; None before there are any."""
+        newest = self._assembly.newest if self._starter is None else self._starter.newest_imu
+        return None if math.isnan(self._record.begin) else (self._record.begin, newest)
+
+    @property
+    def record(self) -> Record:
+        """What was counted so far."""
+        return self._record
 
     def _begin_from(self, start: Start) -> None:
         if len(start.imu_errors) != self._imus:
@@ -161,16 +200,22 @@ class Navigator:
         start, collected = found
         for kind, count in starter.counts.items():
             self.counts[kind] = self.counts.get(kind, 0) + count
+        self._record.findings += starter.findings
         self._begin_from(start)
-        names = [imu.name for imu in self._made.rig.imus]
         for one in after_start(start, collected):
-            if isinstance(one, ImuSample):
-                self.imu(one.time, one.dtheta, one.dvel, names.index(one.imu))
-            elif isinstance(one, SensorSample):
-                self.aid(one.kind, one.time, one.value, one.std)
-            else:
-                assert one.position_std is not None
-                self.gnss(one.time, one.position, one.position_std, one.velocity, one.velocity_std)
+            self._take_sample(one)
+            if self.caught_up is not None:
+                self.caught_up(one)
+
+    def _take_sample(self, sample: Sample) -> None:
+        if isinstance(sample, ImuSample):
+            names = [imu.name for imu in self._made.rig.imus]
+            self.imu(sample.time, sample.dtheta, sample.dvel, names.index(sample.imu))
+        elif isinstance(sample, SensorSample):
+            self.aid(sample.kind, sample.time, sample.value, sample.std)
+        else:
+            assert sample.position_std is not None
+            self.gnss(sample.time, sample.position, sample.position_std, sample.velocity, sample.velocity_std)
 
     def imu(self, time: float, dtheta: ArrayLike, dvel: ArrayLike, imu: int | None = None) -> None:
         """Take what IMU `imu` of the rig measured in the interval that ends at `time`, s: rad and m/s, shape (3,).
@@ -183,15 +228,87 @@ class Navigator:
             return
         values = np.empty(6)
         values[:3], values[3:] = dtheta, dvel
+        if self._record.epochs == 0 and math.isnan(self._record.begin):
+            self._record.begin = time
         if not _finite(time, values):
             self._refuse(NOT_FINITE)
         elif self._starter is not None:
-            self._collect(ImuSample(self._made.rig.imus[imu].name, time, values[:3], values[3:]))
+            self._collect(self._sample(imu, time, values))
         elif imu in self._place:
-            refused = self._assembly.add(self._place[imu], time, values)
-            if refused:
-                self._refuse(refused)
+            self._add(self._place[imu], time, values)
             self._step()
+
+    def _sample(self, imu: int, time: float, values: Array) -> ImuSample:
+        return ImuSample(self._made.rig.imus[imu].name, time, values[:3], values[3:])
+
+    def _add(self, i: int, time: float, values: Array) -> None:
+        """Let a sample of the IMU at place i wait for its epoch, or for what is told by those after it."""
+        if self._starter is not None:
+            self._collect(self._sample(self._taken[i], time, values))
+            return
+        newest = self._assembly.newest
+        if time > newest + FUTURE and newest > -math.inf:
+            for one in self._ahead.hold(Increments(time, i, values)):
+                self._refuse(self._assembly.add(one.imu, one.time, one.values))
+            if self._ahead.goes_on:
+                self._end_pause(newest)
+            return
+        self._refuse(self._assembly.add(i, time, values))
+        if self._ahead:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Take what is no longer ahead of the IMUs, which go on where they were, and refuse what still is."""
+        for one in self._ahead.in_order(self._recording.options.gnss_snap):
+            if isinstance(one, Increments):
+                self._refuse(self._assembly.add(one.imu, one.time, one.values))
+            elif one.sample.time > self._assembly.newest + self.delay:
+                self._refuse(FUTURE_STAMPED)
+            else:
+                self._apply(one.events)
+
+    def _end_pause(self, last: float) -> None:
+        """Go on after a pause, which began at `last`, s, or anew if it was hopeless."""
+        first = self._ahead.first
+        held = self._ahead.in_order(self._recording.options.gnss_snap)
+        if first - last > restart.hopeless(self._recording.rig.has_wheels, self._has_fixes):
+            self._begin_anew(last, first)
+        else:
+            self._assembly.newest = first
+        for one in held:
+            if isinstance(one, Increments):
+                self._add(one.imu, one.time, one.values)
+                self._step()
+            elif self._starter is None:
+                self._apply(one.events)
+            elif one.sample.time >= first:
+                self._collect(one.sample)
+            else:
+                self._refuse(IN_PAUSE)
+
+    def _begin_anew(self, last: float, first: float) -> None:
+        """End the run at a pause, from `last` to `first`, s, and look for a start after it."""
+        self._step(at_end=True)
+        line = self._timeline
+        before = None if line is None else batch.known(line.run, line.last)
+        lost = self._recording.rig.has_wheels and not self._has_fixes
+        blank = Recording(self._made.rig, (), geodetic=self._recording.geodetic, options=self._recording.options)
+        starter = Starter(
+            restart.after(blank, before, lost),
+            max(self.delay, self._made.wait),
+            not lost,
+            self._made.method,
+            self._made.imu,
+        )
+        starter.after, starter.before = (last, first), before if lost else None
+        if line is not None:
+            self._record.findings = list(self.findings)
+            self._record.ended.append(line.measured)
+            self._record.part = None
+        self._ended, self._timeline, self._schedule = line, None, None
+        self._first, self._early, self.start = None, [], None
+        self._assembly = Assembly(len(self._taken), self._made.wait, bridge=not self._recording.rig.has_wheels)
+        self._starter = starter
 
     def gnss(
         self,
@@ -210,10 +327,14 @@ class Navigator:
             self._collect_fix(time, position, position_std, velocity, velocity_std)
             return
         antenna = self._recording.rig.antenna
+        place, std = np.asarray(position, dtype=np.float64), np.asarray(position_std, dtype=np.float64)
+        sample = GnssFix(time, place, std, geodetic=self._recording.geodetic)
         fix = [events.of_point(kinds.GNSS_POSITION, time, position, antenna, position_std)]
         if velocity is not None and velocity_std is not None:
             fix.append(events.of_point(kinds.GNSS_VELOCITY, time, velocity, antenna, velocity_std))
-        self._measure(*fix)
+            sample = sample._replace(velocity=np.asarray(velocity), velocity_std=np.asarray(velocity_std))
+        self._has_fixes = True
+        self._measure(sample, *fix)
 
     def aid(self, kind: str, time: float, value: float, std: ArrayLike) -> None:
         """Take what a sensor of the rig shows: a height in m, a heading in rad, or the speed of an odometer in m/s.
@@ -230,7 +351,7 @@ class Navigator:
                 self._refuse(NOT_FINITE)
             return
         stream = AidingStream(kind, np.array([time]), np.array([value], dtype=np.float64), stds[None])
-        self._measure(events.of_sensor(stream, self._recording.rig))
+        self._measure(SensorSample(kind, time, value, stds), events.of_sensor(stream, self._recording.rig))
 
     def _collect_fix(
         self,
@@ -249,28 +370,34 @@ class Navigator:
             self._refuse(NO_STD)
         else:
             geodetic = self._recording.geodetic
+            self._has_fixes = True
             self._collect(GnssFix(time, place, std, speed, speed_std, geodetic=geodetic))
 
     def flush(self) -> None:
         """Take everything that still waits: there are no more data."""
-        if self._starter is not None:
+        if self._ahead:
+            self._settle()
+        starter = self._starter
+        if starter is not None:
             self._collect(None)
+            if self._starter is not None and starter.after is not None:
+                self._record.findings += [*starter.findings, restart.left_out(starter.after, starter.why)]
         self._step(at_end=True)
 
     @property
     def state(self) -> NavigatorState | None:
-        """The state at the newest epoch; None before the first."""
+        """The state at the newest epoch; None before the first, and after a pause until there is a start again."""
         line = self._timeline
-        return None if line is None else _state(line, line.last)
+        return None if line is None else _states(line, line.last)[0]
 
     def history(self, after: float = -math.inf) -> list[NavigatorState]:
         """Return the states of all epochs later than `after`, s, as far back as a measurement may still come."""
-        line = self._timeline
+        line = self._timeline or self._ended
         if line is None:
             return []
         begun = 1 if line.whole else 0
         first = int(np.searchsorted(line.inputs.time[: line.last + 1], after, side="right"))
-        return [_state(line, k) for k in range(max(first, begun), line.last + 1)]
+        return _states(line, max(first, begun))
 
     @property
     def health(self) -> tuple[ImuHealth, ...]:
@@ -299,13 +426,24 @@ class Navigator:
         if self._starter is not None:
             raise InputError(f"{path}: there is no start yet ({self.waits_for}); expected one before a checkpoint")
         due = None if self._schedule is None else self._schedule.memory
-        made = replace(self._made, counts=self.counts, first=self._first, due=due)
-        checkpoint.write(Path(path), made, self._assembly, events.merged(*self._early), self._timeline)
+        made = replace(
+            self._made,
+            counts=self.counts,
+            first=self._first,
+            due=due,
+            findings=tuple(self._record.findings),
+            fixes=self._has_fixes,
+        )
+        line = {} if self._timeline is None else self._timeline.arrays()
+        early = events.merged(*self._early)
+        remembered = checkpoint.Remembered(self._assembly.arrays(), early, line, self._record.arrays())
+        checkpoint.write(Path(path), made, remembered)
 
     @classmethod
     def resume(cls, path: Path | str) -> Navigator:
         """Return the navigator that was saved; raise InputError for a file that is not whole or of another version."""
-        made, samples, early, line = checkpoint.read(Path(path))
+        made, remembered = checkpoint.read(Path(path))
+        early, line = remembered.early, remembered.line
         navigator = cls(
             made.rig,
             made.start,
@@ -317,11 +455,14 @@ class Navigator:
             wait=made.wait,
         )
         navigator.counts, navigator._first = made.counts, made.first
+        navigator._has_fixes = made.fixes
         navigator._early = [early.at(slice(row, row + 1)) for row in range(len(early.time))]
-        navigator._assembly.restore(samples)
+        navigator._assembly.restore(remembered.samples)
         if line:
             navigator._timeline = navigator._new_timeline(np.array([0.0, 1.0]), np.zeros((2, 6, len(navigator._taken))))
             navigator._timeline.restore(line)
+        navigator._record.restore(remembered.record)
+        navigator._record.findings = list(made.findings)
         if made.due is not None and navigator._schedule is not None:
             navigator._schedule.memory = made.due
         return navigator
@@ -342,12 +483,16 @@ class Navigator:
         if not _finite(time, values.ravel()):
             self._refuse(NOT_FINITE)
             return
+        if self._record.epochs == 0 and math.isnan(self._record.begin):
+            self._record.begin = time
         epoch = self._assembly.pass_through(time, values)
         if epoch is not None:
             self._take(epoch)
+            if self._ahead:
+                self._settle()
             return
         for i, row in enumerate(values):
-            self._refuse(self._assembly.add(i, time, row))
+            self._add(i, time, row.copy())
         self._step()
 
     def _step(self, at_end: bool = False) -> None:
@@ -367,14 +512,19 @@ class Navigator:
         assert self.start is not None
         aligned = Aligned(time, increments, (), np.zeros((len(time), len(self._taken)), dtype=bool))
         prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start, gaps=True)
-        self._order = prepared.order
+        self._order, self._ended = prepared.order, None
         self._schedule = batch.schedule_of(self._choice, self._recording, self.start)
+        if math.isnan(self._record.interval):
+            self._record.interval = float(time[1] - time[0])
+        self._record.part = Part(Windows(self._recording.rig, 1.0 / float(time[1] - time[0])))
         return Timeline(prepared, self.delay)
 
     def _begin(self, first: Epoch, second: Epoch) -> None:
         increments = np.array([first.increments, second.increments])
         self._timeline = self._new_timeline(np.array([first.time, second.time]), increments)
         self._first = None
+        assert self._record.part is not None
+        self._record.part.take(first)
         early, self._early = self._early, []
         for event in early:
             self._refuse(self._aid(self._timeline, event))
@@ -398,27 +548,41 @@ class Navigator:
         if self._choice.speed:
             lacking, bias = (present == rigid.NOTHING)[None], self.start.imu_errors[:, :3]
             travel = wheels.travel(rig, self._choice.speed, increments[None], interval, lacking, bias)
-        stamp = np.array([epoch.time])
+        stamp, increments = np.array([epoch.time]), increments[:, self._order]
         assert self._schedule is not None
         due = self._schedule.events(stamp, interval, travel[:, 1])
-        line.append(
-            epoch.time,
-            increments[:, self._order],
-            present[self._order],
-            travel[0],
-            events.scheduled(due, stamp, self._recording.options, rig),
-        )
+        queue = events.scheduled(due, stamp, self._recording.options, rig)
+        if epoch.missing.all():
+            queue = events.merged(self._bridged(epoch.time, increments, line), queue)
+        line.append(epoch.time, increments, present[self._order], travel[0], queue)
+        assert self._record.part is not None
+        self._record.part.take(epoch)
+        self._record.take(epoch.time, line.outputs.states[line.last, 0:3])
 
-    def _measure(self, *measurements: Events) -> None:
-        """Take measurements of one time and one source: all or none."""
+    def _bridged(self, time: float, increments: Array, line: Timeline) -> Events:
+        """Return the noise of an epoch in which no IMU has data."""
+        before = slice(max(line.last - 1, 0), line.last + 1)
+        times = np.append(line.inputs.time[before], time)
+        missing = np.zeros((len(times), 1), dtype=bool)
+        missing[-1] = True
+        rows = np.concatenate([line.inputs.increments[before], increments[None]])
+        return batch.bridged(self._recording.rig, times, rows, missing, self._recording.options.gnss_snap)
+
+    def _measure(self, sample: Sample, *measurements: Events) -> None:
+        """Take measurements of one time and one source: all or none; `sample` is what came."""
         time = float(measurements[0].time[0])
         if not math.isfinite(time + sum(one.value.sum() + one.variance.sum() for one in measurements)):
             self._refuse(NOT_FINITE)
         elif not all((one.variance > 0.0).any() and not (one.variance < 0.0).any() for one in measurements):
             self._refuse(NO_STD)
         elif time > self._assembly.newest + self.delay:
-            self._refuse(FUTURE_STAMPED)
-        elif self._timeline is None:
+            for _ in self._ahead.hold_measured(Measured(sample, measurements)):
+                self._refuse(IN_PAUSE)
+        else:
+            self._apply(measurements)
+
+    def _apply(self, measurements: tuple[Events, ...]) -> None:
+        if self._timeline is None:
             self._early.extend(measurements)
         else:
             for one in measurements:
@@ -435,17 +599,30 @@ class Navigator:
         return BEFORE_START if line.whole else LATE
 
 
-def _state(line: Timeline, k: int) -> NavigatorState:
-    row, variances = line.outputs.states[k].copy(), line.outputs.variances[k].copy()
-    return NavigatorState(
-        time=float(line.inputs.time[k]),
-        position=row[0:3],
-        velocity=row[3:6],
-        attitude=row[6:10],
-        position_std=np.sqrt(variances[0:3]),
-        velocity_std=np.sqrt(variances[3:6]),
-        phi_covariance=variances[6:12],
+def _states(line: Timeline, first: int) -> list[NavigatorState]:
+    """Return the states at the epochs of a window from one on."""
+    here = slice(first, line.last + 1)
+    time, rows, variances = (
+        line.inputs.time[here],
+        line.outputs.states[here].copy(),
+        line.outputs.variances[here].copy(),
     )
+    time, position, velocity, attitude = line.inputs.time[here], rows[:, 0:3], rows[:, 3:6], rows[:, 6:10]
+    track = Trajectory(time, position, velocity, attitude, variances[:, 0:3], variances[:, 3:6], variances[:, 6:12])
+    status = status_of(track, line.aided, line.snap) if len(time) else ()
+    return [
+        NavigatorState(
+            time=float(time[k]),
+            position=position[k],
+            velocity=velocity[k],
+            attitude=attitude[k],
+            position_std=np.sqrt(variances[k, 0:3]),
+            velocity_std=np.sqrt(variances[k, 3:6]),
+            phi_covariance=variances[k, 6:12],
+            status=STATUSES[number],
+        )
+        for k, number in enumerate(status)
+    ]
 
 
 def _finite(time: float, values: Array) -> bool:

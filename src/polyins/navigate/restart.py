@@ -1,107 +1,215 @@
-"""A recording of an array that pauses: each part is a run of its own, which begins with what is known of its IMUs.
+"""What pauses: each part between two pauses is a run of its own, which begins with what is known of its IMUs.
 
-After a pause of all IMUs the velocity is off by as much as the vehicle changed it, and nothing tells where it looks. A
+While no IMU has data the velocity goes off by as much as the vehicle changes it, and nothing tells where it looks. A
 covariance that says so would be too large for a filter that is linear in its errors. So the state is found anew; the
-errors of the IMUs are kept, less sure by what they drift in that time.
+errors of the IMUs are kept, less sure by what they drift in that time. On wheels without GNSS nothing tells place and
+heading again: the old ones stand, as unsure as what a vehicle can drive and turn.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.model.findings import Finding
-from polyins.model.recording import ImuStream, Recording, StartOptions, usual_interval
+from polyins.model.recording import GnssStream, ImuStream, Recording, StartOptions
 from polyins.model.rig import Imu, ImuErrors
 from polyins.model.solution import Solution
-from polyins.prepare.timesync import gaps_of
+from polyins.prepare.alignment import Start
 
 Array = NDArray[np.float64]
 
-HOPELESS = 10.0
-"""s without data of any IMU, after which the state is found anew"""
-LEAST = 5.0
-"""s of data that a part has at least"""
+HOPELESS, HOPELESS_ON_WHEELS, HOPELESS_BLIND = 1.0, 0.6, 3.0
+"""s without data of any IMU, after which the state is found anew: of an array; of wheels with GNSS, which coast; and
+without. What a vehicle may turn in that time, see `bridging`, is as much as a filter that is linear takes. Without
+fixes there is nothing to take, and nothing that would tell the heading again."""
 AGED = 1.5
 """times the std of IMU errors after a pause"""
+USUAL_SPEED = 10.0
+"""m/s, at least, that a vehicle may drive in a pause"""
+CLIMBED = 0.1
+"""of the way: height that a vehicle gains or loses on it"""
+UNKNOWN = "unknown: that before the pause"
+ANY_HEADING = np.pi / np.sqrt(3.0)
+"""rad: std of a heading of which nothing is known"""
 
-Run = Callable[[Recording], Solution]
+
+@dataclass(frozen=True)
+class Known:
+    """What a run knows at its last epoch."""
+
+    time: float
+    """s"""
+    position: Array
+    """see `model.recording`"""
+    velocity: Array
+    """m/s north, east, down"""
+    heading: float
+    """rad"""
+    position_std: Array
+    """m"""
+    imu_errors: dict[str, tuple[Array, Array]]
+    """of each IMU by its name, and their std, (12,) each"""
+
+
+def hopeless(on_wheels: bool, fixes: bool) -> float:
+    """Return how long no IMU may have data before the state is found anew, s; `fixes`: whether there is GNSS."""
+    if not on_wheels:
+        return HOPELESS
+    return HOPELESS_ON_WHEELS if fixes else HOPELESS_BLIND
 
 
 def pauses(recording: Recording) -> list[tuple[float, float]]:
-    """Return where no IMU has data for longer than `HOPELESS`: the last stamp before and the first after, s."""
-    if recording.rig.has_wheels or not recording.imus:
-        return []
+    """Return where no IMU has data for hopelessly long: the last stamp before and the first after, s."""
+    limit = hopeless(recording.rig.has_wheels, recording.gnss is not None)
     common = [(-np.inf, np.inf)]
     for stream in recording.imus:
-        own = [gap for gap in gaps_of(stream.time, usual_interval(stream.time)) if gap[1] - gap[0] > HOPELESS]
-        both = [(max(a, c), min(b, d)) for a, b in common for c, d in own]
-        common = [(begin, end) for begin, end in both if end - begin > HOPELESS]
-    return common
+        edges = np.concatenate([[-np.inf], stream.time, [np.inf]])
+        wide = np.flatnonzero(np.diff(edges) > limit)
+        both = [(max(a, edges[k]), min(b, edges[k + 1])) for a, b in common for k in wide]
+        common = [(begin, end) for begin, end in both if end - begin > limit]
+    return [(float(begin), float(end)) for begin, end in common if np.isfinite(end - begin)]
 
 
-def run_parts(recording: Recording, run: Run) -> Solution:
-    """Run a recording part by part between its pauses; a part that gives no start is left out, with a finding."""
-    found = pauses(recording)
-    borders = [*(begin for begin, _ in found), np.inf]
-    solution = run(_part(recording, -np.inf, borders[0]))
-    parts, findings = [solution], list(solution.findings)
-    for (last, first), end in zip(found, borders[1:], strict=True):
-        part = _after_pause(_part(recording, last, end), parts[-1])
-        pause = f"no IMU has data for {first - last:.1f} s from {last:.2f} s"
+def run_parts(
+    recording: Recording,
+    found: list[tuple[float, float]],
+    run: Callable[[Recording, Known | None], tuple[Solution, Known]],
+) -> Solution:
+    """Run a recording part by part between its pauses; a part that gives no start is left out, with a finding.
+
+    `run` takes a part, and what the run before it knew. Raises InputError if no part gives a start.
+    """
+    borders = [-np.inf, *(last for last, _ in found), np.inf]
+    before: Known | None = None
+    parts: list[Solution] = []
+    findings: list[Finding] = []
+    refusal: InputError | None = None
+    for k, (begin, end) in enumerate(pairwise(borders)):
+        pause = found[k - 1] if k else None
+        part = _part(recording, begin, end, pause)
         try:
-            if min(stream.time[-1] - stream.time[0] for stream in part.imus if stream.time.size > 1) < LEAST:
-                raise InputError(f"less than {LEAST:g} s of data")
-            solution = run(part)
-        except (InputError, ValueError) as error:
-            text = f"{pause}; what follows is left out: {error}"
-            findings.append(Finding("pause", text, from_s=last, to_s=first, size=first - last))
+            _check_data(part)
+            solution, knowing = run(part if pause is None else after(part, before, is_lost(part)), before)
+        except InputError as error:
+            refusal = refusal or error
+            findings += [] if pause is None else [left_out(pause, str(error))]
             continue
-        begins = float(solution.time[0])
-        text = f"{pause}; the state was found anew at {begins:.2f} s ({solution.start.get('heading', '')})"
-        findings.append(Finding("restart", text, from_s=last, to_s=begins, size=first - last))
+        if pause is not None:
+            findings.append(restarted(pause, solution.start))
         findings += [one for one in solution.findings if one not in findings]
         parts.append(solution)
+        before = knowing
+    if not parts:
+        assert refusal is not None
+        raise refusal
     whole = Solution.joined(parts)
     return replace(whole, start=parts[0].start, findings=tuple(findings), recording_span=_span(recording))
 
 
-def _span(recording: Recording) -> tuple[float, float]:
-    stamps = [stream.time[[0, -1]] for stream in recording.imus]
-    return float(np.min(stamps)), float(np.max(stamps))
+def left_out(pause: tuple[float, float], why: str) -> Finding:
+    """Say that what follows a pause gives no start."""
+    text = f"{_words(pause)}; what follows is left out: {why}"
+    return Finding("pause", text, from_s=pause[0], to_s=pause[1], size=pause[1] - pause[0])
 
 
-def _part(recording: Recording, after: float, until: float) -> Recording:
-    """Return the recording with the IMUs' data after one time and up to another, s."""
-    streams = []
-    for stream in recording.imus:
-        kept = slice(*np.searchsorted(stream.time, [after, until], "right"))
-        streams.append(ImuStream(stream.name, stream.time[kept], stream.dtheta[kept], stream.dvel[kept]))
-    return replace(recording, imus=tuple(streams))
+def restarted(pause: tuple[float, float], start: Mapping[str, object]) -> Finding:
+    """Say that the state was found anew after a pause; `start`: its time and where it came from, as of a solution."""
+    heading, begins = start.get("heading"), cast(float, start["time_s"])
+    text = f"{_words(pause)}; the state was found anew at {begins:.2f} s (heading: {heading})"
+    size = pause[1] - pause[0]
+    if heading != UNKNOWN:
+        return Finding("restart", text, from_s=pause[0], to_s=begins, size=size)
+    remedy = "GNSS tells place and heading again; start.time_s begins a run of its own after the pause"
+    return Finding("restart", text, "serious", from_s=pause[0], to_s=begins, size=size, remedy=remedy)
 
 
-def _after_pause(recording: Recording, before: Solution) -> Recording:
-    """Return a part that knows of its IMUs what the part before it found, and of its state nothing."""
+def _words(pause: tuple[float, float]) -> str:
+    return f"no IMU has data for {pause[1] - pause[0]:.1f} s from {pause[0]:.2f} s"
+
+
+def is_lost(recording: Recording) -> bool:
+    """Whether nothing in a recording tells place and heading after a pause."""
+    return recording.rig.has_wheels and recording.gnss is None and recording.start.heading_from != "reference"
+
+
+def after(recording: Recording, before: Known | None, lost: bool) -> Recording:
+    """Return a part that knows of its IMUs what the part before it found; of its state what a pause leaves of it.
+
+    `lost`: whether the old place and heading stand. Of a start that is given for a time of its own all stands.
+    """
     wanted = recording.start
-    start = StartOptions(
-        end_time=wanted.end_time, heading_from="reference" if wanted.heading_from == "reference" else "auto"
-    )
-    known = dict(zip(before.imu_names, range(len(before.imu_names)), strict=True))
+    if before is None and wanted.time is not None:
+        return recording
+    start = StartOptions(end_time=wanted.end_time)
+    if wanted.heading_from == "reference":
+        start = replace(start, heading_from="reference")
+    if before is None:
+        return replace(recording, start=start)
+    if lost:
+        start = replace(start, position=before.position, heading=before.heading)
     imus = [
-        _with_errors(imu, before.imu_errors[-1, known[imu.name]], AGED * before.imu_error_std[-1, known[imu.name]])
-        if imu.name in known and len(before.imu_errors)
-        else imu
+        _with_errors(imu, *before.imu_errors[imu.name]) if imu.name in before.imu_errors else imu
         for imu in recording.rig.imus
     ]
     return replace(recording, start=start, rig=replace(recording.rig, imus=tuple(imus)))
 
 
+def as_lost(start: Start, before: Known) -> Start:
+    """Return a start at the old place and heading, as unsure as a vehicle that drove and turned since."""
+    speed = max(USUAL_SPEED, float(np.linalg.norm(before.velocity)))
+    driven = np.array([1.0, 1.0, CLIMBED]) * speed * (start.time - before.time)
+    return replace(
+        start,
+        position_std=np.hypot(before.position_std, driven),
+        attitude_std=np.array([*start.attitude_std[:2], ANY_HEADING]),
+        sources={**start.sources, "position": "that before the pause", "heading": UNKNOWN},
+    )
+
+
+def _span(recording: Recording) -> tuple[float, float]:
+    stamps = [stream.time[[0, -1]] for stream in recording.imus if stream.time.size]
+    return float(np.min(stamps)), float(np.max(stamps))
+
+
+def _part(recording: Recording, begin: float, end: float, pause: tuple[float, float] | None) -> Recording:
+    """Return the recording with the data after one time and up to another, s; `pause`: that before it."""
+    streams = []
+    for stream in recording.imus:
+        kept = slice(*np.searchsorted(stream.time, [begin, end], "right"))
+        streams.append(ImuStream(stream.name, stream.time[kept], stream.dtheta[kept], stream.dvel[kept]))
+    gnss = recording.gnss
+    if gnss is not None and pause is not None:
+        gnss = _fixes(gnss, gnss.time >= pause[1])
+    return replace(recording, imus=tuple(streams), gnss=gnss)
+
+
+def _check_data(part: Recording) -> None:
+    for stream in part.imus:
+        if stream.time.size < 2:
+            raise InputError(f"no data from {stream.name}")
+    if part.gnss is not None and not part.gnss.time.size:
+        raise InputError("no fix from GNSS")
+
+
+def _fixes(gnss: GnssStream, kept: NDArray[np.bool_]) -> GnssStream:
+    def of(values: Array | None) -> Array | None:
+        return None if values is None else values[kept]
+
+    stds = gnss.position_std[kept]
+    return GnssStream(gnss.time[kept], gnss.position[kept], stds, of(gnss.velocity), of(gnss.velocity_std))
+
+
 def _with_errors(imu: Imu, errors: Array, std: Array) -> Imu:
+    """Return an IMU whose errors are known, less sure than they were."""
+
     def of(values: Array) -> ImuErrors:
         return ImuErrors(values[0:3], values[3:6], values[6:9], values[9:12])
 
-    return replace(imu, initial_errors=of(errors), initial_std=of(np.minimum(std, imu.start_std())))
+    return replace(imu, initial_errors=of(errors), initial_std=of(np.minimum(AGED * std, imu.start_std())))

@@ -15,8 +15,8 @@ from polyins.navigate import window
 from polyins.navigate.state import COMPLETED, EARTH, MEASURED, STRIDE, Inputs, Plan, State, Work
 from polyins.navigate.state import SILENT as NOTHING
 
-SILENT, RETURNED = 0, 1
-"""rows of `State.silent`"""
+SILENT, RETURNED, PAUSED = 0, 1, 2
+"""rows of `State.silent`: since when, and the noise of pauses of all"""
 
 REALIGNMENT = 0.5
 """s, from when a wheel's data are back until it measures again: about a turn of the wheel"""
@@ -91,6 +91,24 @@ def move_silent(state: State, plan: Plan, work: Work, inputs: Inputs, k: int) ->
                 fuse.fuse_states(state.rows, first, last, state.blocks[s], work.sums[s], dt)
                 window.begin_anew(state, plan, now)
         fuse.fuse_states(state.rows, first, last, state.blocks[s], work.sums[s], dt)
+
+
+@scalar_kernel
+def add_noise(state: State, plan: Plan, variances: Array) -> None:
+    """Add what a pause of all IMUs leaves unknown of position, velocity, tilt and heading, in common to all blocks.
+
+    A block that is still silent remembers it until it measures again.
+    """
+    stride = int(plan.settings[STRIDE])
+    for s in range(plan.spans.shape[0]):
+        for i in range(NAV):
+            noise = variances[3] if i == NAV - 1 else variances[i // 3]
+            state.blocks[s, P + i * (stride + 1)] += noise
+            for t in range(s + 1, plan.spans.shape[0] if state.joint.shape[0] > 0 else 0):
+                state.joint[s * stride + i, t * stride + i] += noise
+        if state.silent[SILENT, s] >= 0.0:
+            for k in range(4):
+                state.silent[PAUSED + k, s] += variances[k]
 
 
 @scalar_kernel
@@ -199,10 +217,12 @@ def _reseed(state: State, s: int, stride: int) -> None:
         for j in range(stride):
             block[P + i * stride + j] = 0.0
             block[P + j * stride + i] = 0.0
+    noise = state.silent[PAUSED : PAUSED + 4, s]
     for k in range(3):
-        block[P + k * (stride + 1)] = RESEED_POSITION**2
-        block[P + (3 + k) * (stride + 1)] = RESEED_VELOCITY**2
-        block[P + (6 + k) * (stride + 1)] = RESEED_HEADING**2 if k == 2 else RESEED_TILT**2
+        block[P + k * (stride + 1)] = RESEED_POSITION**2 + noise[0]
+        block[P + (3 + k) * (stride + 1)] = RESEED_VELOCITY**2 + noise[1]
+        block[P + (6 + k) * (stride + 1)] = RESEED_HEADING**2 + noise[3] if k == 2 else RESEED_TILT**2 + noise[2]
+    noise[:] = 0.0
     for i in range(NAV):
         for j in range(state.joint.shape[0]):
             state.joint[s * stride + i, j] = 0.0

@@ -9,10 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from polyins.errors import InputError
+from polyins.model.findings import Finding
 from polyins.model.methods import find_method
 from polyins.model.recording import GnssStream, ImuStream, Recording
-from polyins.navigate import batch
+from polyins.navigate import batch, restart
 from polyins.navigate.choice import choose
+from polyins.navigate.restart import Known
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.start import same
 from polyins.prepare import course, timesync
@@ -63,6 +65,11 @@ class Starter:
 
         `needs_fix`: the position is to come from GNSS. `method`, `imu`: as for `Navigator`.
         """
+        self.after: tuple[float, float] | None = None
+        """s, s: the pause of all IMUs after which the state is looked for"""
+        self.before: Known | None = None
+        """what was known before it, where that is all that there is of place and heading"""
+        self.findings: list[Finding] = []
         self.method = find_method(method)
         self.taken = choose(self.method, blank.rig, imu).all
         self.found: tuple[float, Start] | None = None
@@ -77,7 +84,9 @@ class Starter:
         self.fixes = _Rows(13)
         self.shown: list[SensorSample] = []
         """by sensors that say nothing of the start"""
-        self.newest = float("-inf")
+        self.newest = self.newest_imu = float("-inf")
+        self.oldest = float("inf")
+        """s, of IMU data"""
         self.attempt: float | None = None
         """s: data up to this time are looked at next"""
 
@@ -93,6 +102,15 @@ class Starter:
         if sample.time < self.newest - self.delay:
             self.counts["late"] += 1
             return None
+        if isinstance(sample, ImuSample):
+            longest = restart.hopeless(self.blank.rig.has_wheels, self.needs_fix or bool(self.fixes.stamps))
+            if self.newest_imu > float("-inf") and sample.time - self.newest_imu > longest:
+                found = self._from(self._found(self.newest_imu))
+                if found is not None:
+                    return found[0], [*found[1], sample]
+                self._begin_anew(sample.time)
+            self.newest_imu = max(self.newest_imu, sample.time)
+            self.oldest = min(self.oldest, sample.time)
         self.newest = max(self.newest, sample.time)
         rows.add(*_row(sample))
         if self.attempt is None:
@@ -101,9 +119,9 @@ class Starter:
         if sample.time < self.attempt + self.delay:
             return None
         until, self.attempt = self.attempt, self.attempt + EVERY
-        start = self._settled(until)
-        if start is not None:
-            return start, self._collected()
+        found = self._from(self._settled(until))
+        if found is not None:
+            return found
         if until % CUT_EVERY == 0.0:
             for rows in (*self.imus.values(), self.fixes):
                 rows.cut(until - KEPT)
@@ -112,8 +130,29 @@ class Starter:
 
     def finish(self) -> tuple[Start, list[Sample]] | None:
         """Return the start that the data have, now that there are no more, and all that was collected."""
-        start = self._found(self.newest)
-        return None if start is None else (start, self._collected())
+        return self._from(self._found(self.newest))
+
+    def _from(self, start: Start | None) -> tuple[Start, list[Sample]] | None:
+        """Return a start that was found, as sure as the pause before it lets it be, and all that was collected."""
+        if start is None:
+            return None
+        if self.before is not None:
+            start = restart.as_lost(start, self.before)
+        if self.after is not None:
+            self.findings.append(restart.restarted(self.after, {"time_s": start.time, **start.sources}))
+        return start, self._collected()
+
+    def _begin_anew(self, time: float) -> None:
+        """Let all go that lies before the end of a pause, s: there is no start in it."""
+        if self.after is not None:
+            self.findings.append(restart.left_out(self.after, self.why))
+        else:
+            self.blank = restart.after(self.blank, None, lost=False)
+        self.after = self.newest_imu, time
+        for rows in (*self.imus.values(), self.fixes):
+            rows.cut(time)
+        self.shown = [sample for sample in self.shown if sample.time >= time]
+        self.attempt = self.found = None
 
     def _first_attempt(self, begin: float) -> float:
         start = self.blank.start

@@ -72,7 +72,8 @@ class State(NamedTuple):
     """covariance of all blocks together, square; empty unless they are joined"""
     scalars: Array
     silent: Array
-    """(2, blocks): since when each is silent, and since when a silent one has data again, s; below zero: not"""
+    """(6, blocks): since when each is silent, and since when a silent one has data again, s; below zero: not; and while
+    it is, the variances of position, velocity, tilt and heading that pauses of all IMUs have added"""
 
 
 class Plan(NamedTuple):
@@ -184,7 +185,7 @@ def empty_state(rows: int, blocks: int, merged: bool, stride: int, joined: bool)
         (blocks + merged, block_size(stride)),
         (joint, joint),
         (SCALARS,),
-        (2, blocks),
+        (6, blocks),
     )
     ends = np.cumsum([-(-math.prod(shape) // EIGHT) * EIGHT for shape in shapes])
     memory = layout.zeros(int(ends[-1]))

@@ -6,6 +6,7 @@ state back to the note before it, and the epochs since then are taken again: the
 
 from __future__ import annotations
 
+from array import array as growing
 from dataclasses import replace
 from typing import Any
 
@@ -13,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.kernels.jit import compiled_for
-from polyins.navigate import engine
-from polyins.navigate.batch import Prepared, empty_outputs
+from polyins.navigate import engine, outcome
+from polyins.navigate.batch import USUAL_AIDING, Prepared, empty_outputs
 from polyins.navigate.events import Events
 from polyins.navigate.state import LOG_EVERY, NEXT_EVENT, NEXT_LOG, SNAP, VALUES, Inputs, Outputs
 from polyins.navigate.update import UNUSED
@@ -41,6 +42,8 @@ class Timeline:
         self.run = prepared
         self.run.plan.settings[LOG_EVERY] = NEVER
         self.snap = float(self.run.plan.settings[SNAP])
+        self._measured: growing[float] = growing("d")
+        """rows of the measurements that the window has left behind, see `outcome`"""
         interval = float(inputs.time[1] - inputs.time[0])
         size = 4 * STRIDE
         while size < 2.0 * depth / interval:
@@ -100,6 +103,19 @@ class Timeline:
             self._advance(note * STRIDE + 1, self.last + 1)
         return True
 
+    @property
+    def measured(self) -> Array:
+        """What became of all measurements so far, a row of each, see `outcome`."""
+        used = int(np.searchsorted(self.inputs.event_time[: self.events], self.time + self.snap, "right"))
+        gone = np.array(self._measured).reshape(-1, outcome.WIDTH)
+        return np.concatenate([gone, outcome.rows_of(self.inputs, self.outputs, slice(0, used), self.last)])
+
+    @property
+    def aided(self) -> Array:
+        """When positions or speeds were accepted, s: of the window, and the latest before it, or the start."""
+        rows = outcome.rows_of(self.inputs, self.outputs, slice(0, self.events), self.last)
+        return np.concatenate([self.run.aided, outcome.aided_at(rows)])
+
     def has_event(self, kind: int, time: float) -> bool:
         """Whether there is an event of that kind and time in the window."""
         same = self.inputs.event_time[: self.events] == time
@@ -158,6 +174,7 @@ class Timeline:
     def _copy_window(self, gone: int, epochs: int, events: int) -> None:
         """Copy the window without its first notes into one of that size, which may be the same."""
         by_epoch, by_event, notes = self._by_epoch(), self._by_event(), self._notes
+        self._leave_behind(int(self._scalars(notes[gone : gone + 1])[0, NEXT_EVENT]))
         if (epochs, events) != (len(self.inputs.time), len(self.inputs.event_time)):
             self._allocate(epochs, events)
         first, last = gone * STRIDE, self.last + 1
@@ -177,6 +194,13 @@ class Timeline:
         self.events = kept
         self.whole = self.whole and gone == 0
         engine.tidy(self.run.navigators)
+
+    def _leave_behind(self, used: int) -> None:
+        """Keep what became of the first events of the window."""
+        rows = outcome.rows_of(self.inputs, self.outputs, slice(0, used), self.last)
+        self._measured.frombytes(np.ascontiguousarray(rows).tobytes())
+        aided = np.concatenate([self.run.aided, outcome.aided_at(rows)])
+        self.run.aided[:] = [float(time) for time in aided[-USUAL_AIDING:]]
 
     def _by_epoch(self) -> list[NDArray[Any]]:
         travelled = [self.inputs.travel] if len(self.inputs.travel) else []
@@ -200,6 +224,8 @@ class Timeline:
             "memory": self.run.memory,
             "notes": self._notes[:used],
             "counts": np.array(counts),
+            "measured": np.array(self._measured),
+            "aided": np.array(self.run.aided),
         }
         found |= {f"epochs{n}": array[: self.last + 1] for n, array in enumerate(self._by_epoch())}
         return found | {f"events{n}": array[: self.events] for n, array in enumerate(self._by_event())}
@@ -210,6 +236,8 @@ class Timeline:
         self.whole = bool(whole)
         self._allocate(epochs, events)
         self.run.memory[:] = arrays["memory"]
+        self._measured = growing("d", arrays["measured"])
+        self.run.aided[:] = [float(time) for time in arrays["aided"]]
         self._notes[: len(arrays["notes"])] = arrays["notes"]
         for n, array in enumerate(self._by_epoch()):
             array[: self.last + 1] = arrays[f"epochs{n}"]

@@ -36,6 +36,8 @@ MANY = 1500
 """fixes that are looked at: the search is over a triangle of them"""
 FITTED = 10.0
 """s of fixes to which speed and acceleration are fitted"""
+BEND = float(np.sqrt(180.0))
+"""A parabola leaves its line by a misfit m, rms, over a time T: at the begin its slope is off by that times m / T."""
 AT_ONCE = 1.0
 """s of fixes that tell how it turns, and where they have velocities accelerates, at the start"""
 UNSTEADY_SPEED_STD = 0.3
@@ -221,8 +223,10 @@ class _Way:
         if len(after) < 3:
             return float(np.diff(self.position[part, 2])[0] / np.diff(after)[0]), 2.0
         std = float(np.median(self.std[part]))
-        sink = np.polyfit(after, self.position[part, 2], 1)[0]
-        return float(sink), float(std * 2.0 / np.sqrt(np.sum((after - after.mean()) ** 2)))
+        line = np.polyfit(after, self.position[part, 2], 1)
+        misfit = np.sqrt(np.mean((self.position[part, 2] - np.polyval(line, after)) ** 2))
+        noise = std * 2.0 / np.sqrt(np.sum((after - after.mean()) ** 2))
+        return float(line[0]), float(np.hypot(noise, BEND * misfit / after[-1]))
 
 
 def _speed(time: Array, distance: Array, std: float) -> tuple[float, float, float, float]:

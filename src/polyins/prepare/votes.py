@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ LEVER = 0.1
 UNEQUAL = 3.0
 """times noisier than another, from which an IMU is named"""
 AXES = ("x", "y", "z")
+DIFFERS = "disagreement"
+"""kind of the finding"""
 
 
 def disagreements(rig: Rig, aligned: Aligned) -> tuple[Finding, ...]:
@@ -42,15 +45,72 @@ def disagreements(rig: Rig, aligned: Aligned) -> tuple[Finding, ...]:
     used = slice(1, 1 + windows * length)
     edges = aligned.time[np.arange(windows + 1) * length]
     mean = aligned.increments[used].reshape(windows, length, 6, count).sum(axis=1) / np.diff(edges)[:, None, None]
-    mean -= np.array([imu.initial_errors.as_array()[:6] for imu in rig.imus]).T
     whole = ~np.asarray(aligned.missing[used].reshape(windows, length, count).any(axis=1))
+    found = _judged(rig, mean, whole, edges)
+    if count == 2:
+        return found
+    return tuple(_mount_of(rig, aligned, one) or one if one.kind == DIFFERS else one for one in found)
+
+
+class Windows:
+    """Sums over windows of epochs as they come, whose means `disagreements` judges."""
+
+    def __init__(self, rig: Rig, rate_hz: float) -> None:
+        """`rate_hz`: of the epochs."""
+        count = 0 if rig.has_wheels else len(rig.imus)
+        self.length = max(2, round(WINDOW * rate_hz)) if count > 1 else 0
+        """epochs; 0: nothing is to be judged"""
+        self.edges: list[float] = []
+        self.means: list[Array] = []
+        self.whole: list[NDArray[np.bool_]] = []
+        self._sum, self._missing, self._epochs = np.zeros((6, count)), np.zeros(count, dtype=bool), 0
+
+    def add(self, time: float, increments: Array, missing: NDArray[np.bool_]) -> None:
+        """Take an epoch, (6, N) and (N,); the first one is the edge of the first window."""
+        if not self.length:
+            return
+        if not self.edges:
+            self.edges.append(time)
+            return
+        self._sum += increments
+        self._missing |= missing
+        self._epochs += 1
+        if self._epochs == self.length:
+            self.means.append(self._sum / (time - self.edges[-1]))
+            self.whole.append(~self._missing)
+            self.edges.append(time)
+            self._sum, self._missing, self._epochs = 0.0 * self._sum, self.whole[-1] & False, 0
+
+    def disagreements(self, rig: Rig) -> tuple[Finding, ...]:
+        """Return what there is to say of the windows that are full."""
+        if len(self.means) < LASTING:
+            return ()
+        return _judged(rig, np.array(self.means), np.array(self.whole), np.array(self.edges))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all that is needed to go on, for a file."""
+        now = np.array([self.length, self._epochs])
+        full = {"edges": np.array(self.edges), "means": np.array(self.means), "whole": np.array(self.whole)}
+        return {**full, "sum": self._sum, "lacking": self._missing, "window": now}
+
+    @classmethod
+    def restored(cls, arrays: dict[str, NDArray[Any]]) -> Windows:
+        """Return the windows whose arrays these are."""
+        windows = cls.__new__(cls)
+        windows.length, windows._epochs = (int(number) for number in arrays["window"])
+        windows.edges = [float(edge) for edge in arrays["edges"]]
+        windows.means, windows.whole = list(arrays["means"]), list(arrays["whole"])
+        windows._sum, windows._missing = arrays["sum"].copy(), arrays["lacking"].copy()
+        return windows
+
+
+def _judged(rig: Rig, mean: Array, whole: NDArray[np.bool_], edges: Array) -> tuple[Finding, ...]:
+    """Judge means over windows, (W, 6, N), of which those that are whole count, (W, N); `edges`: (W + 1,), s."""
+    mean = mean - np.array([imu.initial_errors.as_array()[:6] for imu in rig.imus]).T
     middle = np.median(mean, axis=2, keepdims=True)
     allowed = SIGMAS * _std(rig, middle[:, :, 0]) + _unmodelled(middle[:, :, 0])[:, :, None]
     over = np.where(whole[:, None, :], np.abs(mean - middle) / allowed, 0.0)
-    found: Iterable[Finding] = _found(rig, mean - middle, over, edges)
-    if count > 2:
-        found = (_mount_of(rig, aligned, finding) or finding for finding in found)
-    return (*_unequal(rig), *found)
+    return (*_unequal(rig), *_found(rig, mean - middle, over, edges))
 
 
 def _mount_of(rig: Rig, aligned: Aligned, finding: Finding) -> Finding | None:
@@ -99,7 +159,7 @@ def _found(rig: Rig, off: Array, over: Array, edges: Array) -> Iterator[Finding]
         begin, end = float(edges[rows[0]]), float(edges[rows[-1] + 1])
         who = f"IMU {imu.name} and IMU {rig.imus[1].name} differ" if pair else f"IMU {imu.name} differs from the others"
         yield Finding(
-            "disagreement",
+            DIFFERS,
             f"{who} by {shown} in {what} from {begin:.1f} to {end:.1f} s, more than their noise figures explain",
             "doubt",
             stream=f"{imu.name}, {rig.imus[1].name}" if pair else imu.name,

@@ -19,7 +19,7 @@ from polyins.formats.columns import is_parquet
 from polyins.formats.rows import ImuRows
 from polyins.model.findings import Finding
 from polyins.model.recording import ImuStream, Recording
-from polyins.navigate.restart import HOPELESS
+from polyins.navigate.restart import hopeless
 from polyins.prepare import timesync
 from polyins.prepare.timesync import Aligned, Whole
 from polyins.reading import loading, usable
@@ -154,7 +154,8 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
     config, files, extents = _of_imus(kept, config, files, extents)
     places = [alive[i] for i in kept]
     span = _span(files, extents)
-    if _pauses(extents):
+    wheels = any(entry.wheel is not None for entry in config.imus)
+    if _pauses(extents, hopeless(wheels, config.gnss is not None)):
         return None  # each part is a run of its own
     until = _head_end(config, document, extents, span)
     streams = tuple(StretchReader(file).until(until, span[0]) for file in files)
@@ -185,12 +186,12 @@ def _of_imus(
     return kept, tuple(files[i] for i in indices), tuple(extents[i] for i in indices)
 
 
-def _pauses(extents: Sequence[StreamExtent]) -> bool:
+def _pauses(extents: Sequence[StreamExtent], longest: float) -> bool:
     """Whether there is a time without data of any IMU after which the state is found anew."""
-    first = [gap for gap in extents[0].gaps if gap[1] - gap[0] > HOPELESS]
+    first = [gap for gap in extents[0].gaps if gap[1] - gap[0] > longest]
     others = [extent.gaps for extent in extents[1:]]
     return any(
-        all(any(min(end, b) - max(begin, a) > HOPELESS for a, b in gaps) for gaps in others) for begin, end in first
+        all(any(min(end, b) - max(begin, a) > longest for a, b in gaps) for gaps in others) for begin, end in first
     )
 
 

@@ -80,7 +80,7 @@ def run(
                 part, errors = _thinned(part, errors, float(share))
             shown.append((part, errors))
         solution = Solution.joined([part for part, _ in shown])
-        found = replace(solution, findings=(*solution.findings, *of_measurements(solution)))
+        found = replace(solution, findings=(*solution.findings, *of_measurements(solution.measurements)))
         for writer in writers:
             writer.finish(found)
     judged = [errors for _, errors in shown if errors is not None]
