@@ -219,7 +219,7 @@ class Live:
             "imus": report.get("imus", []),
             "checkpoints": checkpoints,
             "files": [path.name for path in self.files if path.is_file()],
-            "warnings": list(warnings),
+            "warnings": [*warnings, *(finding.sentence for finding in session.findings)],
         }
 
 

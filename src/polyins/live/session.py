@@ -13,6 +13,7 @@ import numpy as np
 from polyins.files import write_bytes
 from polyins.live.sinks import Outlet
 from polyins.live.snapshot import Snapshot
+from polyins.model.findings import Finding
 from polyins.navigate.samples import Array, ImuSample, Sample, SensorSample
 from polyins.navigate.starter import Starter, after_start
 from polyins.prepare.alignment import Start
@@ -168,6 +169,12 @@ class Session:
             "imus": [_health(one) for one in self.navigator.health],
             "fix_age_s": self.last.state.time - max(self.fix_times) if self.fix_times else None,
         }
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Which samples of which IMU were left out, before the start and after it."""
+        later = () if self.navigator is None else self.navigator.findings
+        return (*self.starter.refusals.findings(), *later)
 
     def refused(self) -> Counter[str]:
         """Return what starter and navigator refused, by kind."""

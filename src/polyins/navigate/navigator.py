@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.aiding import kinds
 from polyins.errors import InputError
 from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.findings import Finding
 from polyins.model.methods import find_method
 from polyins.model.recording import AidingStream, FilterOptions, Recording, StartOptions
 from polyins.model.rig import Rig
@@ -22,18 +23,20 @@ from polyins.navigate import batch, checkpoint, events
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
+from polyins.navigate.refusals import NOT_FINITE, Refusals, unfit
 from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.starter import Starter, after_start
 from polyins.navigate.timeline import Timeline
 from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.assembly import DUPLICATED, FUTURE_STAMPED, LATE, Assembly, Epoch
-from polyins.prepare.timesync import Aligned
+from polyins.prepare.plausible import limits_of
+from polyins.prepare.timesync import GAP, Aligned
 from polyins.version import __version__
 
 Array = NDArray[np.float64]
 
-NOT_FINITE, BEFORE_START, NO_STD = "not finite", "before the start", "std not positive"
+BEFORE_START, NO_STD = "before the start", "std not positive"
 HEALTH_WINDOW = 1.0  # s
 
 
@@ -131,6 +134,10 @@ class Navigator:
         """measurements that came before the first epoch"""
         self.counts: dict[str, int] = {}
         """what was refused, by kind"""
+        self._refusals = Refusals()
+        self._limits = [limits_of(on_wheel=imu.wheel is not None) for imu in rig.imus]
+        self._usual = min(limits.rate for limits in self._limits)
+        """rad/s or m/s^2: below it, no sample of all together is beyond a range"""
         self._starter: Starter | None = None
         if isinstance(start, Start):
             self._begin_from(start)
@@ -144,6 +151,11 @@ class Navigator:
     def waits_for(self) -> str:
         """Why there is no start yet; empty once there is one."""
         return "" if self._starter is None else self._starter.why
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Which samples of which IMU were left out, and when."""
+        return self._refusals.findings() if self._starter is None else self._starter.refusals.findings()
 
     def _begin_from(self, start: Start) -> None:
         if len(start.imu_errors) != self._imus:
@@ -161,6 +173,7 @@ class Navigator:
         start, collected = found
         for kind, count in starter.counts.items():
             self.counts[kind] = self.counts.get(kind, 0) + count
+        self._refusals.take_over(starter.refusals)
         self._begin_from(start)
         names = [imu.name for imu in self._made.rig.imus]
         for one in after_start(start, collected):
@@ -176,21 +189,21 @@ class Navigator:
         """Take what IMU `imu` of the rig measured in the interval that ends at `time`, s: rad and m/s, shape (3,).
 
         In array axes: a rotated mount is the caller's. Without `imu`, samples of all IMUs with one stamp, shape (N, 3).
-        A sample that cannot be taken is counted in `counts`. Raises InputError for samples of another number of IMUs.
+        A sample that cannot be taken is counted in `counts` and told in `findings`. Raises InputError for samples of
+        another number of IMUs.
         """
         if imu is None:
             self._all(time, np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64).reshape(-1, 6))
             return
         values = np.empty(6)
         values[:3], values[3:] = dtheta, dvel
-        if not _finite(time, values):
-            self._refuse(NOT_FINITE)
+        why = self._unfit(imu, time, values)
+        if why:
+            self._leave_out(imu, why, time)
         elif self._starter is not None:
             self._collect(ImuSample(self._made.rig.imus[imu].name, time, values[:3], values[3:]))
         elif imu in self._place:
-            refused = self._assembly.add(self._place[imu], time, values)
-            if refused:
-                self._refuse(refused)
+            self._leave_out(imu, self._assembly.add(self._place[imu], time, values), time)
             self._step()
 
     def gnss(
@@ -330,6 +343,20 @@ class Navigator:
         if why:
             self.counts[why] = self.counts.get(why, 0) + 1
 
+    def _leave_out(self, imu: int, why: str, time: float) -> None:
+        """Count a sample of an IMU that is refused for a reason, if there is one, at the time of the others."""
+        if why:
+            self._refuse(why)
+            newest = self._assembly.newest if self._starter is None else self._starter.newest
+            refusals = self._refusals if self._starter is None else self._starter.refusals
+            refusals.add(self._made.rig.imus[imu].name, why, newest if math.isfinite(newest) else time)
+
+    def _unfit(self, imu: int, time: float, values: Array) -> str:
+        place = self._place.get(imu)
+        nominal = math.nan if place is None else float(self._assembly.nominal[place])
+        step = math.nan if place is None else time - float(self._assembly.ends[place])
+        return unfit(time, values, self._limits[imu], step if 0.0 < step <= GAP * nominal else nominal)
+
     def _all(self, time: float, values: Array) -> None:
         if len(values) != self._imus:
             raise InputError(f"imu: increments of {len(values)} IMUs; expected those of {self._imus}")
@@ -339,15 +366,15 @@ class Navigator:
             return
         if self._takes_some:
             values = values[self._taken]
-        if not _finite(time, values.ravel()):
-            self._refuse(NOT_FINITE)
-            return
-        epoch = self._assembly.pass_through(time, values)
+        size = math.hypot(*values.ravel().tolist())
+        fit = size <= self._usual * self._assembly.nominal[0] and values.any(axis=1).all()
+        epoch = self._assembly.pass_through(time, values) if fit and math.isfinite(time) else None
         if epoch is not None:
             self._take(epoch)
             return
-        for i, row in enumerate(values):
-            self._refuse(self._assembly.add(i, time, row))
+        for place, imu in enumerate(self._taken):
+            why = self._unfit(imu, time, values[place]) or self._assembly.add(place, time, values[place])
+            self._leave_out(imu, why, time)
         self._step()
 
     def _step(self, at_end: bool = False) -> None:
@@ -386,6 +413,8 @@ class Navigator:
         rig, interval = self._recording.rig, np.array([epoch.time - line.time])
         increments, present = epoch.increments, np.ones(len(rig.imus), dtype=np.uint8)
         if epoch.missing.any():
+            for i in np.flatnonzero(epoch.missing):
+                self._refusals.note_silence(rig.imus[i].name, epoch.time)
             one = Aligned(
                 np.array([line.time, epoch.time]),
                 np.array([epoch.increments, epoch.increments]),
@@ -446,11 +475,6 @@ def _state(line: Timeline, k: int) -> NavigatorState:
         velocity_std=np.sqrt(variances[3:6]),
         phi_covariance=variances[6:12],
     )
-
-
-def _finite(time: float, values: Array) -> bool:
-    # of all sums the fastest: what is not finite does not cancel
-    return math.isfinite(values.dot(values) + time)
 
 
 def _or_none(value: float) -> float | None:
