@@ -17,6 +17,7 @@ from polyins import cli
 from polyins.live import run as live_run
 from polyins.live import sources
 from polyins.live.run import Options
+from polyins.navigate import refusals
 
 PAGE = test_documentation.REPOSITORY / "docs" / "live.md"
 BLOCKS = test_documentation.blocks(PAGE)
@@ -117,10 +118,12 @@ def test_every_kind_of_refusal_is_listed() -> None:
     text = PAGE.read_text().replace("\n", " ")
     folder = Path(sources.__file__).parent
     found: set[str] = set()
-    for file in (*folder.glob("*.py"), folder.parent / "navigate" / "starter.py"):
+    for file in folder.glob("*.py"):
         code = file.read_text()
         found |= set(re.findall(r'RefusedError\("([^"]+)"\)', code)) | set(re.findall(r'counts\["([^"]+)"\]', code))
-    assert len(found) > 15
+    assert len(found) > 12
+    found |= set(refusals.WHY) - {refusals.NOTHING}
+    assert len(found) > 17
     assert not [kind for kind in found if f"`{kind}`" not in text]
 
 

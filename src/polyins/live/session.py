@@ -187,6 +187,7 @@ class Session:
 
     def judged(self, findings: Sequence[Finding]) -> Verdict:
         """Return the verdict on the run so far; `findings`: of its configuration."""
+        findings = (*findings, *self.starter.refusals.findings())
         if self.navigator is not None and self.navigator.record.epochs:
             return of_live(self.navigator, findings)
         text = f"no start was found: {self.starter.why if self.navigator is None else self.navigator.waits_for}"

@@ -28,19 +28,21 @@ from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
 from polyins.navigate.record import Part, Record
+from polyins.navigate.refusals import NOT_FINITE, Refusals, unfit
 from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.starter import Starter, after_start
 from polyins.navigate.timeline import Timeline
 from polyins.prepare import rigid, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.assembly import DUPLICATED, FUTURE, FUTURE_STAMPED, LATE, Assembly, Epoch
-from polyins.prepare.timesync import Aligned
+from polyins.prepare.plausible import limits_of
+from polyins.prepare.timesync import GAP, Aligned
 from polyins.prepare.votes import Windows
 from polyins.version import __version__
 
 Array = NDArray[np.float64]
 
-NOT_FINITE, BEFORE_START, NO_STD = "not finite", "before the start", "std not positive"
+BEFORE_START, NO_STD = "before the start", "std not positive"
 IN_PAUSE = "without IMU data"
 HEALTH_WINDOW = 1.0  # s
 
@@ -148,6 +150,10 @@ class Navigator:
         self._has_fixes = False
         self.caught_up: Callable[[Sample], None] | None = None
         """called after each of the samples that were collected before a start, with it"""
+        self._refusals = Refusals()
+        self._limits = [limits_of(on_wheel=imu.wheel is not None) for imu in rig.imus]
+        self._usual = min(limits.rate for limits in self._limits)
+        """rad/s or m/s^2: below it, no sample of all together is beyond a range"""
         self._starter: Starter | None = None
         if isinstance(start, Start):
             self._begin_from(start)
@@ -166,7 +172,9 @@ class Navigator:
     def findings(self) -> tuple[Finding, ...]:
         """What there is to say of the data and of pauses so far; `evaluation.verdict.of_live` judges the rest."""
         part = self._record.part
-        return (*self._record.findings, *(part.findings(self._choice, self._recording) if part else ()))
+        of_part = part.findings(self._choice, self._recording) if part else ()
+        refusals = self._refusals if self._starter is None else self._starter.refusals
+        return (*refusals.findings(), *self._record.findings, *of_part)
 
     @property
     def measurements(self) -> dict[str, Innovations]:
@@ -201,6 +209,7 @@ class Navigator:
         for kind, count in starter.counts.items():
             self.counts[kind] = self.counts.get(kind, 0) + count
         self._record.findings += starter.findings
+        self._refusals.take_over(starter.refusals)
         self._begin_from(start)
         for one in after_start(start, collected):
             self._take_sample(one)
@@ -221,17 +230,19 @@ class Navigator:
         """Take what IMU `imu` of the rig measured in the interval that ends at `time`, s: rad and m/s, shape (3,).
 
         In array axes: a rotated mount is the caller's. Without `imu`, samples of all IMUs with one stamp, shape (N, 3).
-        A sample that cannot be taken is counted in `counts`. Raises InputError for samples of another number of IMUs.
+        A sample that cannot be taken is counted in `counts` and told in `findings`. Raises InputError for samples of
+        another number of IMUs.
         """
         if imu is None:
             self._all(time, np.concatenate([dtheta, dvel], axis=-1, dtype=np.float64).reshape(-1, 6))
             return
         values = np.empty(6)
         values[:3], values[3:] = dtheta, dvel
-        if self._record.epochs == 0 and math.isnan(self._record.begin):
+        why = self._unfit(imu, time, values)
+        if not why and self._record.epochs == 0 and math.isnan(self._record.begin):
             self._record.begin = time
-        if not _finite(time, values):
-            self._refuse(NOT_FINITE)
+        if why:
+            self._leave_out(imu, why, time)
         elif self._starter is not None:
             self._collect(self._sample(imu, time, values))
         elif imu in self._place:
@@ -249,19 +260,22 @@ class Navigator:
         newest = self._assembly.newest
         if time > newest + FUTURE and newest > -math.inf:
             for one in self._ahead.hold(Increments(time, i, values)):
-                self._refuse(self._assembly.add(one.imu, one.time, one.values))
+                self._assemble(one.imu, one.time, one.values)
             if self._ahead.goes_on:
                 self._end_pause(newest)
             return
-        self._refuse(self._assembly.add(i, time, values))
+        self._assemble(i, time, values)
         if self._ahead:
             self._settle()
+
+    def _assemble(self, i: int, time: float, values: Array) -> None:
+        self._leave_out(self._taken[i], self._assembly.add(i, time, values), time)
 
     def _settle(self) -> None:
         """Take what is no longer ahead of the IMUs, which go on where they were, and refuse what still is."""
         for one in self._ahead.in_order(self._recording.options.gnss_snap):
             if isinstance(one, Increments):
-                self._refuse(self._assembly.add(one.imu, one.time, one.values))
+                self._assemble(one.imu, one.time, one.values)
             elif one.sample.time > self._assembly.newest + self.delay:
                 self._refuse(FUTURE_STAMPED)
             else:
@@ -301,6 +315,7 @@ class Navigator:
             self._made.imu,
         )
         starter.after, starter.before = (last, first), before if lost else None
+        starter.refusals = self._refusals
         if line is not None:
             self._record.findings = list(self.findings)
             self._record.ended.append(line.measured)
@@ -471,6 +486,20 @@ class Navigator:
         if why:
             self.counts[why] = self.counts.get(why, 0) + 1
 
+    def _leave_out(self, imu: int, why: str, time: float) -> None:
+        """Count a sample of an IMU that is refused for a reason, if there is one, at the time of the others."""
+        if why:
+            self._refuse(why)
+            newest = self._assembly.newest if self._starter is None else self._starter.newest
+            refusals = self._refusals if self._starter is None else self._starter.refusals
+            refusals.add(self._made.rig.imus[imu].name, why, newest if math.isfinite(newest) else time)
+
+    def _unfit(self, imu: int, time: float, values: Array) -> str:
+        place = self._place.get(imu)
+        nominal = math.nan if place is None else float(self._assembly.nominal[place])
+        step = math.nan if place is None else time - float(self._assembly.ends[place])
+        return unfit(time, values, self._limits[imu], step if 0.0 < step <= GAP * nominal else nominal)
+
     def _all(self, time: float, values: Array) -> None:
         if len(values) != self._imus:
             raise InputError(f"imu: increments of {len(values)} IMUs; expected those of {self._imus}")
@@ -480,19 +509,22 @@ class Navigator:
             return
         if self._takes_some:
             values = values[self._taken]
-        if not _finite(time, values.ravel()):
-            self._refuse(NOT_FINITE)
-            return
-        if self._record.epochs == 0 and math.isnan(self._record.begin):
+        size = math.hypot(*values.ravel().tolist())
+        fit = size <= self._usual * self._assembly.nominal[0] and values.any(axis=1).all() and math.isfinite(time)
+        if fit and self._record.epochs == 0 and math.isnan(self._record.begin):
             self._record.begin = time
-        epoch = self._assembly.pass_through(time, values)
+        epoch = self._assembly.pass_through(time, values) if fit else None
         if epoch is not None:
             self._take(epoch)
             if self._ahead:
                 self._settle()
             return
-        for i, row in enumerate(values):
-            self._add(i, time, row.copy())
+        for place, imu in enumerate(self._taken):
+            why = self._unfit(imu, time, values[place])
+            if why:
+                self._leave_out(imu, why, time)
+            else:
+                self._add(place, time, values[place].copy())
         self._step()
 
     def _step(self, at_end: bool = False) -> None:
@@ -536,6 +568,8 @@ class Navigator:
         rig, interval = self._recording.rig, np.array([epoch.time - line.time])
         increments, present = epoch.increments, np.ones(len(rig.imus), dtype=np.uint8)
         if epoch.missing.any():
+            for i in np.flatnonzero(epoch.missing):
+                self._refusals.note_silence(rig.imus[i].name, epoch.time)
             one = Aligned(
                 np.array([line.time, epoch.time]),
                 np.array([epoch.increments, epoch.increments]),
@@ -623,11 +657,6 @@ def _states(line: Timeline, first: int) -> list[NavigatorState]:
         )
         for k, number in enumerate(status)
     ]
-
-
-def _finite(time: float, values: Array) -> bool:
-    # of all sums the fastest: what is not finite does not cancel
-    return math.isfinite(values.dot(values) + time)
 
 
 def _or_none(value: float) -> float | None:

@@ -14,11 +14,14 @@ from polyins.model.methods import find_method
 from polyins.model.recording import GnssStream, ImuStream, Recording
 from polyins.navigate import batch, restart
 from polyins.navigate.choice import choose
+from polyins.navigate.refusals import Refusals, unfit
 from polyins.navigate.restart import Known
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.start import same
 from polyins.prepare import course, timesync
 from polyins.prepare.alignment import Start
+from polyins.prepare.assembly import DUPLICATED, LATE, LONGEST_BEGIN
+from polyins.prepare.plausible import limits_of
 
 EVERY = 1.0
 """s of data between two attempts"""
@@ -31,6 +34,8 @@ SETTLED = 3.0
 BEFORE_START = 2.0
 """s of data before the start, by which the navigator knows the rates of the IMUs"""
 CUT_EVERY = 10.0  # s
+LONGEST_STEP = 1.0
+"""s that a sample is taken to be of where that is not known"""
 
 
 @dataclass
@@ -78,6 +83,8 @@ class Starter:
         self.delay = delay
         self.needs_fix = needs_fix
         self.counts: Counter[str] = Counter()
+        self.refusals = Refusals()
+        self.limits = {imu.name: limits_of(on_wheel=imu.wheel is not None) for imu in blank.rig.imus}
         self.why = "no data"
         """why there is no start yet"""
         self.imus = {imu.name: _Rows(7) for imu in blank.rig.imus}
@@ -96,11 +103,11 @@ class Starter:
             self.shown.append(sample)
             return None
         rows = self.imus[sample.imu] if isinstance(sample, ImuSample) else self.fixes
-        if sample.time in rows.stamps:
-            self.counts["duplicated"] += 1
-            return None
-        if sample.time < self.newest - self.delay:
-            self.counts["late"] += 1
+        why = self._refused(sample, rows)
+        if why:
+            self.counts[why] += 1
+            if isinstance(sample, ImuSample):
+                self.refusals.add(sample.imu, why, self.newest if rows.numbers else sample.time)
             return None
         if isinstance(sample, ImuSample):
             longest = restart.hopeless(self.blank.rig.has_wheels, self.needs_fix or bool(self.fixes.stamps))
@@ -127,6 +134,18 @@ class Starter:
                 rows.cut(until - KEPT)
             self.shown = [sample for sample in self.shown if sample.time >= until - KEPT]
         return None
+
+    def _refused(self, sample: ImuSample | GnssFix, rows: _Rows) -> str:
+        """Return why a sample cannot be taken, or nothing."""
+        if isinstance(sample, ImuSample):
+            step = sample.time - rows.numbers[-7] if rows.numbers else LONGEST_STEP
+            interval = step if 0.0 < step < LONGEST_STEP else LONGEST_STEP
+            why = unfit(sample.time, np.concatenate([sample.dtheta, sample.dvel]), self.limits[sample.imu], interval)
+            if why:
+                return why
+        if sample.time in rows.stamps:
+            return DUPLICATED
+        return LATE if sample.time < self.newest - self.delay else ""
 
     def finish(self) -> tuple[Start, list[Sample]] | None:
         """Return the start that the data have, now that there are no more, and all that was collected."""
@@ -202,13 +221,18 @@ class Starter:
         streams = []
         for name, collected in self.imus.items():
             rows = _until(collected, until)
-            if len(rows) < 2:
+            if len(rows) < 2 and (self.blank.rig.has_wheels or not self._missed(until)):
                 raise InputError(f"no data from {name}")
             streams.append(ImuStream(name, rows[:, 0], rows[:, 1:4], rows[:, 4:7]))
         gnss = self._gnss(until)
         if gnss is None and self.needs_fix:
             raise InputError("no fix from GNSS")
         return replace(self.blank, imus=tuple(streams), gnss=gnss)
+
+    def _missed(self, until: float) -> bool:
+        """Whether one IMU at least has sent for so long that those that have not are no longer waited for."""
+        firsts = [rows[0, 0] for one in self.imus.values() if len(rows := _until(one, until)) > 1]
+        return bool(firsts) and until - min(firsts) >= LONGEST_BEGIN
 
     def _gnss(self, until: float) -> GnssStream | None:
         rows = _until(self.fixes, until)
