@@ -16,6 +16,7 @@ from polyins.evaluation.documents import CoverageFigures
 from polyins.evaluation.figures import Epochs, Figures
 from polyins.evaluation.outages import partly_covered
 from polyins.evaluation.receiver import of_receiver
+from polyins.evaluation.wheels import of_wheels
 from polyins.model.findings import Finding, Severity, Verdict
 from polyins.model.solution import Innovations, Solution
 
@@ -62,7 +63,9 @@ def verdict(solution: Solution, figures: Figures) -> Verdict:
 def of_measurements(solution: Solution) -> tuple[Finding, ...]:
     """Return what the innovations of a solution say of it."""
     return tuple(
-        finding for kind, measured in solution.measurements.items() for finding in _of_kind(kind, measured.used())
+        finding
+        for kind, measured in solution.measurements.items()
+        for finding in (*of_wheels(kind, measured), *_of_kind(kind, measured.used()))
     )
 
 

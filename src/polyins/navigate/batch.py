@@ -19,7 +19,7 @@ from polyins.model.recording import Recording
 from polyins.model.solution import Innovations, OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.model.status import patience, status_of
-from polyins.navigate import engine, events, layout, receiver, restart, update
+from polyins.navigate import engine, events, layout, receiver, restart, slip, update
 from polyins.navigate import start as search
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
@@ -341,7 +341,7 @@ def _span(recording: Recording) -> tuple[float, float] | None:
 
 def innovations_of(run: Prepared) -> dict[str, Innovations]:
     """Return what became of the measurements, by kind; of GNSS positions in any case."""
-    queue, outputs = Events(*run.inputs[4:8]), run.outputs
+    queue, outputs, recording = Events(*run.inputs[4:8]), run.outputs, run.recording
     velocity = np.flatnonzero(queue.kind == kinds.GNSS_VELOCITY)
     lost = queue.time[velocity][outputs.event_status[velocity] != update.ACCEPTED]
     found = {}
@@ -364,6 +364,8 @@ def innovations_of(run: Prepared) -> dict[str, Innovations]:
             change=rows[:, receiver.D : receiver.D + axes] if of_fix else None,
             noise_ratio=rows[:, receiver.NOISE] if of_fix else None,
             gained=_gained(run, queue.time[shown]) if of_fix else None,
+            slip=rows[:, slip.FOUND : slip.FOUND + 3] if number == kinds.WHEEL_SPEED else None,
+            wheels=tuple(recording.rig.imus[module[0]].name for module in run.choice.speed),
             rows=(queue.variance[shown] > 0.0).sum(axis=1),
             axes=kind.axes,
             unit=kind.unit,
