@@ -116,15 +116,6 @@ def _rate_of_turn(state: State, plan: Plan) -> float:
 
 
 @scalar_kernel
-def _speed(state: State, plan: Plan, part: Array, i: int) -> float:
-    """Return u of a wheel, m/s."""
-    first = plan.spans[0, 0]
-    scale = 1.0 + state.rows[first // LANES, bank.SPEED_SCALE + first % LANES]
-    speed: float = (scale * part[ROLLED + i] + part[TURNED] * plan.wheels[i]) / part[SECONDS]
-    return speed
-
-
-@scalar_kernel
 def _variance(state: State, plan: Plan, speed: float) -> float:
     """Return the variance of a wheel's speed as the blocks predict it, their mean, (m/s)^2."""
     total, count, stride = 0.0, 0, int(plan.settings[STRIDE])
@@ -147,16 +138,18 @@ def _judge(state: State, plan: Plan, part: Array, since: float, alone: float) ->
     cannot tell it from the one that is farthest, or went as both of them in the mean: it may be the rate of turn that
     is wrong, or the radii. Then the mean of all is the best that there is.
     """
-    scalars, count = state.scalars, 0
+    scalars, count, first = state.scalars, 0, plan.spans[0, 0]
     scalars[SLIP + OFFSET] = math.nan
     if part[SECONDS] < SHORTEST:
         return
+    scale = (1.0 + state.rows[first // LANES, bank.SPEED_SCALE + first % LANES]) / part[SECONDS]
+    turning = part[TURNED] / part[SECONDS]
     p = part[AHEAD] / part[SECONDS] + scalars[SLIP + DRIFT] * since
     low, high, near, far, nearest, fast = math.inf, -math.inf, math.inf, 0.0, 0.0, abs(p)
     off = 0.0
     for i in range(plan.wheels.shape[0]):
         if math.isfinite(part[ROLLED + i]):
-            u = _speed(state, plan, part, i)
+            u = scale * part[ROLLED + i] + turning * plan.wheels[i]
             low, high, fast = min(low, u), max(high, u), max(fast, abs(u))
             far = max(far, abs(u - p))
             if abs(u - p) < near:
@@ -179,7 +172,7 @@ def _judge(state: State, plan: Plan, part: Array, since: float, alone: float) ->
         return
     for i in range(plan.wheels.shape[0]):
         if math.isfinite(part[ROLLED + i]):
-            u = _speed(state, plan, part, i)
+            u = scale * part[ROLLED + i] + turning * plan.wheels[i]
             if abs(u - nearest) > differ:
                 _add(scalars, i, u - p, p)
 
