@@ -24,15 +24,14 @@ ANTENNA = (0.2, 0.1, -0.8)
 PERFECT = SensorErrors(noise=False, biases=False, scales=False)
 
 
-@lru_cache(maxsize=8)
-def drive(chips: int = 1, gnss: bool = False, errors: SensorErrors = PERFECT, seed: int = 0) -> Recording:
+def driven(chips: int = 1, gnss: bool = False, errors: SensorErrors = PERFECT) -> Scenario:
     """Two minutes of a small car on a plane, the first ten seconds standing."""
     sides = (("left", -0.4), ("right", 0.4))
     wheel_modules = tuple(
         WheelModule(name=name, position_m=(0.0, y, 0.0), radius_m=0.25, chips=chips, lever_arm_m=(0.0, 0.02, 0.01))
         for name, y in sides
     )
-    scenario = Scenario(
+    return Scenario(
         duration_s=120.0,
         static_s=10.0,
         earth="plane",
@@ -43,7 +42,12 @@ def drive(chips: int = 1, gnss: bool = False, errors: SensorErrors = PERFECT, se
         gnss=Fixes(antenna_position_m=ANTENNA) if gnss else None,
         outages=(),
     )
-    return record(true_run(scenario), seed=seed).recording
+
+
+@lru_cache(maxsize=8)
+def drive(chips: int = 1, gnss: bool = False, errors: SensorErrors = PERFECT, seed: int = 0) -> Recording:
+    """Its recording."""
+    return record(true_run(driven(chips, gnss, errors)), seed=seed).recording
 
 
 def with_rolling(recording: Recording, **options: Any) -> Recording:

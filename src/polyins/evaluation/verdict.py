@@ -17,6 +17,7 @@ from polyins.evaluation.documents import CoverageFigures
 from polyins.evaluation.figures import Epochs, Figures
 from polyins.evaluation.outages import partly_covered
 from polyins.evaluation.receiver import of_receiver
+from polyins.evaluation.wheels import of_wheels
 from polyins.model.findings import Finding, Severity, Verdict
 from polyins.model.solution import Innovations, Solution
 
@@ -77,7 +78,11 @@ def counted(navigator: Navigator) -> Epochs:
 
 def of_measurements(measurements: Mapping[str, Innovations]) -> tuple[Finding, ...]:
     """Return what the innovations of a run, by kind, say of it."""
-    return tuple(finding for kind, measured in measurements.items() for finding in _of_kind(kind, measured.used()))
+    return tuple(
+        finding
+        for kind, measured in measurements.items()
+        for finding in (*of_wheels(kind, measured), *_of_kind(kind, measured.used()))
+    )
 
 
 def _of_epochs(span: tuple[float, float] | None, epochs: Epochs) -> Iterator[Finding]:

@@ -18,7 +18,7 @@ COMPILED = (
     "model/states.py",
     "kernels/*.py",
     "aiding/*.py",
-    *(f"navigate/{name}.py" for name in ("engine", "receiver", "silence", "state", "update", "window")),
+    *(f"navigate/{name}.py" for name in ("engine", "receiver", "silence", "slip", "state", "update", "window")),
     "simulation/flexible.py",
 )
 

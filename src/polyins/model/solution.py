@@ -41,6 +41,11 @@ class Innovations:
     """of a position: the variance that was found from fix to fix and used, over the stated one, or 1; shape (M,)"""
     gained: Array | None = None
     """of a position: what the velocity gained since the fix before by the IMUs alone, m/s, shape (M, 3)"""
+    slip: Array | None = None
+    """of a wheel speed: which of `wheels` were not believed, see `navigate.slip`; by how much the speed of the worst of
+    them was off, and the speed that was expected, m/s; shape (M, 3)"""
+    wheels: tuple[str, ...] = ()
+    """IMUs on the wheels that give the speed"""
     axes: tuple[str, ...] = ("north", "east", "down")
     unit: str = "m"
 
@@ -49,18 +54,20 @@ class Innovations:
         rows = self.std.max(axis=1) > 0.0
         if rows.all():
             return self
-        names = ["time", "residual", "std", "nis", "accepted", "reset", "velocity_rejected", "rows"]
-        names += [name for name in ("change", "noise_ratio", "gained") if getattr(self, name) is not None]
-        kept: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
+        kept: dict[str, Any] = {name: getattr(self, name)[rows] for name in self._by_row()}
         return replace(self, **kept)
 
     @classmethod
     def joined(cls, parts: Sequence[Innovations]) -> Innovations:
         """Return those of parts of a recording that follow one another."""
-        names = ["time", "residual", "std", "nis", "accepted", "reset", "velocity_rejected", "rows"]
-        names += [name for name in ("change", "noise_ratio", "gained") if getattr(parts[0], name) is not None]
+        names = parts[0]._by_row()
         whole: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
         return replace(parts[0], **whole)
+
+    def _by_row(self) -> list[str]:
+        """Return what has a row per measurement."""
+        of_some = [name for name in ("change", "noise_ratio", "gained", "slip") if getattr(self, name) is not None]
+        return ["time", "residual", "std", "nis", "accepted", "reset", "velocity_rejected", "rows", *of_some]
 
 
 _NEVER = np.zeros(0, dtype=bool)

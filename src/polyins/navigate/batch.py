@@ -358,7 +358,7 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         imu_error_time=outputs.log_time,
         imu_errors=log[:, 0, :, :12],
         imu_error_std=log[:, 1, :, :12],
-        measurements=outcome.innovations_of(rows),
+        measurements=outcome.innovations_of(rows, outcome.speed_wheels(run.choice, recording.rig)),
         offsets=offsets_of(run, lanes),
         mounting=log[:, 0, :, 12:15] if recording.rig.has_wheels else None,
         mounting_std=log[:, 1, :, 12:15] if recording.rig.has_wheels else None,

@@ -13,7 +13,7 @@ from polyins.aiding.wheel_speed import AT_END, DURATION, LATERAL, SPEED
 from polyins.kernels import bank, covariance, dense, earth, fuse, joint, strapdown, vehicle
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, entry, formula, kernel, scalar_kernel
-from polyins.navigate import silence, update, window
+from polyins.navigate import silence, slip, update, window
 from polyins.navigate.state import (
     AT_REST,
     EARTH,
@@ -78,6 +78,8 @@ def run(
                     propagate(navigators, further, full_matrices, fraction, until - now)  # A (1), (3), (5);  B (2)
                     if state.scalars[WINDOW_FILLED] >= 0.0:
                         window.fill(state, plan, inputs, k, fraction, until - now)  # B (3)-(4)
+                    if plan.wheels.shape[0] > 0:
+                        slip.note_way(state, plan, inputs, k, fraction, until - now)
                     now = until
                 if arrived and inputs.present.shape[0] > 0:
                     silence.move_silent(state, plan, work, inputs, k)
@@ -218,7 +220,13 @@ def aid(navigators: Navigators, further: Further | None, inputs: Inputs, outputs
     elif kind == kinds.PAUSE:
         silence.add_noise(state, plan, measurement[VALUE : VALUE + 4])
     elif _complete(state, plan, measurement, kind):
-        status = update.apply(state, plan, work, further, outputs.innovations[j])
+        if kind != kinds.WHEEL_SPEED or slip.some_roll(state, plan):
+            slip.leave_out(state, plan, measurement)
+            status = update.apply(state, plan, work, further, outputs.innovations[j])
+        else:
+            status = update.SLIPPED
+    if kind == kinds.WHEEL_SPEED:
+        slip.conclude(state, plan, status, outputs.innovations[j])
     if kind == kinds.GNSS_POSITION:
         state.scalars[REJECTED_AT] = inputs.event_time[j] if status == update.DEWEIGHTED else -math.inf
     outputs.event_status[j] = status
@@ -239,7 +247,9 @@ def _complete(state: State, plan: Plan, measurement: Array, kind: int) -> bool:
     duration = scalars[TIME] - scalars[WINDOW_BEGIN]
     if kind == kinds.ZERO_RATE:
         known = measurement[VALUE] != 0.0
-        scalars[AT_REST] = scalars[WINDOW_FILLED] > 0.0 and (known or window.holds_rest(state, plan, duration))
+        rests = scalars[WINDOW_FILLED] > 0.0 and (known or window.holds_rest(state, plan, duration))
+        # wheels that are locked do not turn either
+        scalars[AT_REST] = rests and (known or slip.some_roll(state, plan))
         measurement[VALUE + 1] = duration
         if known:
             scalars[WINDOW_FILLED] = -1.0

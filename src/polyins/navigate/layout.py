@@ -15,7 +15,7 @@ from polyins.model.methods import Method
 from polyins.model.recording import FilterOptions, Recording
 from polyins.model.rig import DEG, AidingSensor, Imu, NoiseGrade, Rig
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place, stride_for
-from polyins.navigate import receiver
+from polyins.navigate import receiver, slip
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice
 from polyins.navigate.state import Navigators, Plan, State, empty_state, empty_work
@@ -111,7 +111,7 @@ def lay_out(
     merged = count > 1 or rig.has_wheels
     stride = stride_for(states_of(recording.rig))
     rows = -(-len(seats.members) // LANES)
-    memory, state = empty_state(rows, count, merged, stride, joined)
+    memory, state = empty_state(rows, count, len(choice.speed), merged, stride, joined)
     _fill_lanes(state.rows, seats, recording, start, rates)
     for s, (begin, end) in enumerate(seats.spans):
         _fill_block(state.blocks[s], seats.members[begin:end], recording, choice, start)
@@ -219,6 +219,9 @@ def _fill_scalars(scalars: Array, recording: Recording, start: Start) -> None:
     scalars[places.TIME] = start.time
     scalars[places.REJECTED_AT] = -np.inf
     scalars[places.WINDOW_FILLED] = -1.0
+    scalars[places.SLIP_USUAL] = 1.0
+    scalars[places.SLIP_COUNT] = slip.SOON
+    scalars[places.SLIP_SINCE] = np.inf
     scalars[places.EARTH : places.EARTH + 5] = (
         float(recording.geodetic),
         latitude,
@@ -258,6 +261,7 @@ def _plan(row: Method, choice: Choice, seats: Bank, recording: Recording, rows: 
             [rolling.body_speed_std if s in bodies else rolling.wheel_speed_std for s in range(count)]
         )
         ** 2,
+        wheels=np.array([recording.rig.imus[module[0]].position[1] for module in choice.speed]),
         origin=-np.mean([recording.rig.imus[i].position for i in taken], axis=0),
         settings=settings,
     )

@@ -22,7 +22,7 @@ from polyins.model.recording import AidingStream, FilterOptions, Recording, Star
 from polyins.model.rig import Rig
 from polyins.model.solution import Innovations, Trajectory
 from polyins.model.status import STATUSES, status_of
-from polyins.navigate import batch, checkpoint, events, restart
+from polyins.navigate import batch, checkpoint, events, outcome, restart
 from polyins.navigate.ahead import Ahead, Increments, Measured
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
@@ -179,7 +179,8 @@ class Navigator:
     @property
     def measurements(self) -> dict[str, Innovations]:
         """What became of the measurements so far, by kind, as in a `Solution`."""
-        return self._record.measurements(None if self._timeline is None else self._timeline.measured)
+        wheels = outcome.speed_wheels(self._choice, self._recording.rig)
+        return self._record.measurements(None if self._timeline is None else self._timeline.measured, wheels)
 
     @property
     def span(self) -> tuple[float, float] | None:

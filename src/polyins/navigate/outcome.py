@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.aiding import kinds
+from polyins.model.rig import Rig
 from polyins.model.solution import Innovations
-from polyins.navigate import receiver, update
+from polyins.navigate import receiver, slip, update
+from polyins.navigate.choice import Choice
 from polyins.navigate.state import INNOVATION, Inputs, Outputs
 
 Array = NDArray[np.float64]
@@ -39,8 +41,13 @@ def aided_at(rows: Array) -> Array:
     return np.asarray(rows[taken, TIME])
 
 
-def innovations_of(rows: Array) -> dict[str, Innovations]:
-    """Return what became of the measurements, by kind; of GNSS positions in any case."""
+def speed_wheels(choice: Choice, rig: Rig) -> tuple[str, ...]:
+    """Return the names of the IMUs on the wheels that give the speed."""
+    return tuple(rig.imus[module[0]].name for module in choice.speed)
+
+
+def innovations_of(rows: Array, wheels: tuple[str, ...]) -> dict[str, Innovations]:
+    """Return what became of the measurements, by kind; of GNSS positions in any case. `wheels`: that give a speed."""
     every, taken = rows[:, KIND], rows[:, STATUS]
     lost = rows[(every == kinds.GNSS_VELOCITY) & (taken != update.ACCEPTED), TIME]
     found = {}
@@ -61,6 +68,8 @@ def innovations_of(rows: Array) -> dict[str, Innovations]:
             change=told[:, receiver.D : receiver.D + axes] if of_fix else None,
             noise_ratio=told[:, receiver.NOISE] if of_fix else None,
             gained=_gained(shown) if of_fix else None,
+            slip=told[:, slip.FOUND : slip.FOUND + 3] if number == kinds.WHEEL_SPEED else None,
+            wheels=wheels,
             rows=(shown[:, VARIANCE : VARIANCE + 3] > 0.0).sum(axis=1),
             axes=kind.axes,
             unit=kind.unit,

@@ -88,9 +88,9 @@ class Record:
         self.epochs += 1
         self.broken += not math.isfinite(position.sum())
 
-    def measurements(self, rows: Array | None) -> dict[str, Innovations]:
-        """Return what became of the measurements; `rows`: of the part that goes on."""
-        parts = [outcome.innovations_of(each) for each in (*self.ended, *(() if rows is None else (rows,)))]
+    def measurements(self, rows: Array | None, wheels: tuple[str, ...]) -> dict[str, Innovations]:
+        """Return what became of the measurements; `rows`: of the part that goes on, `wheels`: that give a speed."""
+        parts = [outcome.innovations_of(each, wheels) for each in (*self.ended, *(() if rows is None else (rows,)))]
         names = dict.fromkeys(name for part in parts for name in part)
         return {name: Innovations.joined([part[name] for part in parts if name in part]) for name in names}
 

@@ -32,6 +32,11 @@ WINDOW_BEGIN = _take(1)  # s; of the window over which a mean speed or rate is t
 WINDOW_FILLED = _take(1)  # epochs in it; below zero: none is open
 WINDOW_TRAVEL = _take(1)  # what the wheels rolled in it, m
 WINDOW_LATERAL = _take(1)  # m to the right of the axle's middle: the mean place of the wheels that give the speed
+FORWARD = _take(1)  # speed of the vehicle at the last epoch, m/s
+SLIP = _take(6)  # what is found of the wheels at a speed, see `navigate.slip`
+SLIP_USUAL = _take(1)  # mean square by which wheels are off together, over the variance of their speed
+SLIP_COUNT = _take(1)  # speeds from which that is known
+SLIP_SINCE = _take(1)  # since when no wheel is believed, s; infinity: some are
 PREVIOUS = _take(4)  # mean rate of a virtual IMU and the length of its interval, see `fuse.average_increments`
 EARTH = _take(5)  # see `earth.evaluate`: geodetic, latitude, its sine and cosine, plane gravity
 SCALARS = _layout.size
@@ -74,6 +79,8 @@ class State(NamedTuple):
     silent: Array
     """(6, blocks): since when each is silent, and since when a silent one has data again, s; below zero: not; and while
     it is, the variances of position, velocity, tilt and heading that pauses of all IMUs have added"""
+    rolled: Array
+    """(2, 3 + wheels): the way since the last speed, see `navigate.slip`"""
 
 
 class Plan(NamedTuple):
@@ -87,6 +94,8 @@ class Plan(NamedTuple):
     """int64 (rows,): the block of several IMUs that a row belongs to; -1: blocks of one"""
     speed_variance: Array
     """(blocks, 3): of the velocity that wheels give, (m/s)^2 forward, right, down"""
+    wheels: Array
+    """(wheels that give the speed,): m to the right of the axle's middle"""
     origin: Array
     """mean vector from the IMUs to the origin, m, for a virtual one"""
     settings: Array
@@ -102,8 +111,8 @@ class Inputs(NamedTuple):
     present: Array
     """uint8 (T, N): what each IMU has; (0, N): all have data throughout"""
     travel: Array
-    """(T, 2): m that the wheels rolled in the interval that ends at each epoch, NaN where none measures; m to the right
-    of the axle's middle, the mean place of the wheels that do; (0, 2): without wheels"""
+    """(T, 2 + wheels): m that the wheels rolled in the interval that ends at each epoch, NaN where none measures; m to
+    the right of the axle's middle, the mean place of the wheels that do; m of each, or NaN; (0, 2): without wheels"""
     event_time: Array
     """s (M,), in order"""
     event_kind: Array
@@ -125,7 +134,7 @@ class Outputs(NamedTuple):
     """int8 (M,)"""
     innovations: Array
     """(M, INNOVATION): residual 3, its variance 3, NIS; of a GNSS position its change since the last one 3, and the
-    ratio of the variance that was used to the stated one"""
+    ratio of the variance that was used to the stated one; of a wheel speed what is found of slip 3"""
     log_time: Array
     """s (K,)"""
     log: Array
@@ -177,7 +186,7 @@ def block_size(stride: int) -> int:
     return -(-(covariance.P + stride * stride) // EIGHT) * EIGHT
 
 
-def empty_state(rows: int, blocks: int, merged: bool, stride: int, joined: bool) -> tuple[Array, State]:
+def empty_state(rows: int, blocks: int, wheels: int, merged: bool, stride: int, joined: bool) -> tuple[Array, State]:
     """Return the array of all that a run remembers, and the parts of it, which are zero."""
     joint = blocks * stride if joined else 0
     shapes = (
@@ -186,6 +195,7 @@ def empty_state(rows: int, blocks: int, merged: bool, stride: int, joined: bool)
         (joint, joint),
         (SCALARS,),
         (6, blocks),
+        (2, 3 + wheels),
     )
     ends = np.cumsum([-(-math.prod(shape) // EIGHT) * EIGHT for shape in shapes])
     memory = layout.zeros(int(ends[-1]))

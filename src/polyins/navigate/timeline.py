@@ -138,7 +138,7 @@ class Timeline:
             time=np.zeros(epochs),
             increments=np.zeros((epochs, 6, imus)),
             present=np.ones((epochs, imus), dtype=np.uint8),
-            travel=np.zeros((epochs if self.run.choice.speed else 0, 2)),
+            travel=np.zeros((epochs if self.run.choice.speed else 0, self.run.inputs.travel.shape[1])),
             event_time=np.full(events, np.inf),
             event_kind=np.zeros(events, dtype=np.int8),
             event_value=np.zeros((events, VALUES)),

@@ -28,9 +28,9 @@ from polyins.navigate.state import (
     Work,
 )
 
-UNUSED, ACCEPTED, REJECTED, RESET, DEWEIGHTED = 0, 1, 2, 3, 4
+UNUSED, ACCEPTED, REJECTED, RESET, DEWEIGHTED, SLIPPED = 0, 1, 2, 3, 4, 5
 """What became of a measurement: taken as it is; not taken; taken for the position, whatever the prediction; taken with
-the variance of its own innovation."""
+the variance of its own innovation; withheld since no wheel rolls."""
 
 CAUTION = 4.0
 """The gate takes the standard deviations of the prediction times this: P knows nothing of misaligned chips and the

@@ -21,12 +21,14 @@ def travel(
     rig: Rig, speed: Sequence[Sequence[int]], increments: Array, intervals: Array, missing: NDArray[np.bool_],
     start_bias: Array,
 ) -> Array:  # fmt: skip
-    """Return what the wheels rolled in each interval and where the mean of those that speak is, shape (T, 2), m.
+    """Return what the wheels rolled in each interval and where the mean of those that speak is, m; what each rolled.
 
+    Shape (T, 2 + modules); NaN where none, or that one, speaks.
     v = -r w_x, with the rate as the gyro shows it less its bias at the start; chips of a module are averaged.
     `speed`: the modules; `increments` is (T, 6, N), `intervals` (T,), `missing` (T, N), `start_bias` (N, 3).
     """
     total, places, count = np.zeros(len(intervals)), np.zeros(len(intervals)), np.zeros(len(intervals))
+    each = []
     for module in speed:
         rolled = np.zeros(len(intervals))
         speaks = np.ones(len(intervals), dtype=bool)
@@ -38,9 +40,10 @@ def travel(
         total += np.where(speaks, rolled, 0.0)
         places += np.where(speaks, rig.imus[module[0]].position[1], 0.0)
         count += speaks
+        each.append(np.where(speaks, rolled, np.nan))
     with np.errstate(invalid="ignore", divide="ignore"):
         lateral = np.where(count > 0, places / count, 0.0)
-        return np.ascontiguousarray(np.column_stack([np.where(count > 0, total / count, np.nan), lateral]))
+        return np.ascontiguousarray(np.column_stack([np.where(count > 0, total / count, np.nan), lateral, *each]))
 
 
 def mean_radius(rig: Rig, speed: Sequence[Sequence[int]]) -> float:
