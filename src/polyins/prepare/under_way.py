@@ -80,7 +80,7 @@ def find_motion(
     `turned`: how far the heading has turned at given times, rad, less a constant; `bias_std`: of the gyros, rad/s.
     """
     shown = np.flatnonzero(gnss.time >= after)[:MANY]
-    shown = shown[_agrees(gnss, geodetic, shown)]
+    shown = shown[agreeing(gnss, geodetic, shown)]
     if len(shown) < 2:
         return None
     way = _Way(gnss, geodetic, shown, turned)
@@ -96,7 +96,7 @@ def find_motion(
     return None
 
 
-def _agrees(gnss: GnssStream, geodetic: bool, shown: NDArray[np.intp]) -> NDArray[np.bool_]:
+def agreeing(gnss: GnssStream, geodetic: bool, shown: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return which fixes lie where those around them say, within what noise and acceleration allow."""
     count = len(shown)
     if count < AROUND:

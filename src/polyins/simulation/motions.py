@@ -103,8 +103,15 @@ def drive_under_way(rng: np.random.Generator, duration: float) -> Path:
     whole = drive(duration + LONGEST_STOP, static=0.0, seed=int(rng.integers(1 << 31)))
     time = np.arange(0.0, LONGEST_STOP, 0.5)
     begin = float(rng.choice(time[whole.speed(time) > MOVING]))
-    curves = ("speed", "roll", "pitch", "heading", "position")
-    return replace(whole, duration=duration, **{name: Later(getattr(whole, name), begin) for name in curves})
+    return replace(
+        whole,
+        duration=duration,
+        speed=Later(whole.speed, begin),
+        roll=Later(whole.roll, begin),
+        pitch=Later(whole.pitch, begin),
+        heading=Later(whole.heading, begin),
+        position=Later(whole.position, begin),
+    )
 
 
 def flight(rng: np.random.Generator, duration: float) -> Path:
@@ -143,9 +150,7 @@ def hover(rng: np.random.Generator, duration: float) -> Path:
 def sideways(rng: np.random.Generator, duration: float) -> Path:
     """Return a flight of rotors: it goes where it likes, at some m/s, and looks elsewhere."""
     ahead, aside = rng.normal(0.0, 3.0, 2)
-    speeds = [
-        Waves.drawn(rng, np.array([1.5, 0.3]), np.array([10.0, 3.0]), float(mean)) for mean in (ahead, aside)
-    ]
+    speeds = [Waves.drawn(rng, np.array([1.5, 0.3]), np.array([10.0, 3.0]), float(mean)) for mean in (ahead, aside)]
     heading = Waves.drawn(rng, np.array([15.0]) * DEG, np.array([12.0]), any_heading(rng))
     roll, pitch = (Waves.drawn(rng, np.array([6.0, 1.0]) * DEG, np.array([8.0, 2.0])) for _ in range(2))
     return path(Profile(speeds[0], roll, pitch, heading, speeds[1]), duration=duration)

@@ -21,11 +21,12 @@ from polyins.model.rig import DEG
 from polyins.model.solution import Solution
 from polyins.navigate import batch
 from polyins.simulation import motions
+from polyins.simulation.drive_scenario import Drive
 from polyins.simulation.error_scenario import SensorErrors
 from polyins.simulation.increments import increments
 from polyins.simulation.path import Path
 from polyins.simulation.run import TrueRun, record, true_run
-from polyins.simulation.scenario import Board, Drive, Fixes, Scenario
+from polyins.simulation.scenario import Board, Fixes, Scenario
 from polyins.simulation.wheel_scenario import WheelModule
 
 Array = NDArray[np.float64]
@@ -48,6 +49,8 @@ SHOWN = ("rest", "drive", "flight", "walk", "wheels")
 """kinds that have to start"""
 DURATION = 75.0  # s
 RATES = (50.0, 100.0)
+UNLEVELLED = ("wheel-ins", "dual-wheel-ins")
+"""methods without an IMU on the body, which tell neither roll nor pitch"""
 WHEEL_METHODS = ("wheel-ins", "body-ins", "dual-wheel-ins", "triple-ins", "triple-ins/centralized")
 WATCHED = 20.0
 """s after the start in which heading and tilt are looked at"""
@@ -89,7 +92,7 @@ class Outcome:
     heading_std: Array = field(default_factory=_none)
     """rad"""
     tilt: Array = field(default_factory=_none)
-    """error over std of roll and pitch, the larger one"""
+    """error over std of roll and pitch, the larger one; empty where the method does not tell them"""
     covered: float = 0.0
     """share of the recording that has a solution"""
     level: str = ""
@@ -108,7 +111,8 @@ def case(number: int) -> Case:
     if given:
         time = recording.imus[0].time[0]
         true = float(run.path.truth([time]).attitude[0, 2])
-        recording = replace(recording, start=StartOptions(heading=true + rng.normal(0.0, HEADING_STD)))
+        given_heading = true + rng.normal(0.0, HEADING_STD)
+        recording = replace(recording, start=StartOptions(heading=given_heading, heading_time=float(time)))
     count = len(recording.imus)
     array = "single" if count == 1 else str(rng.choice(["enav-fusion", "imu-fusion", "nav-fusion"]))
     method = str(rng.choice(WHEEL_METHODS)) if kind == "wheels" else array
@@ -129,14 +133,14 @@ def outcome(one: Case) -> Outcome:
         one,
         heading=np.abs(phi[shown, 2]),
         heading_std=std[:, 2],
-        tilt=np.max(np.abs(phi[shown, :2]) / std[:, :2], axis=1),
+        tilt=_none() if one.method in UNLEVELLED else np.max(np.abs(phi[shown, :2]) / std[:, :2], axis=1),
         covered=float((solution.time[-1] - solution.time[0]) / (span[-1] - span[0])),
         level=summarize(solution, None)["verdict"]["level"],
     )
 
 
 def errors(solution: Solution, truth: Path) -> tuple[Array, Array]:
-    """Return the error phi of the attitude, north, east, down, rad, shape (T, 3), and what its variance is stated as."""
+    """Return the errors phi of the attitude, north, east, down, rad, shape (T, 3), and their stated variances."""
     true = rotation_matrices(truth.truth(solution.time).quaternion)
     turned = rotation_matrices(solution.attitude) @ true.transpose(0, 2, 1)
     return -Rotation.from_matrix(turned).as_rotvec(), solution.phi_covariance[:, [0, 3, 5]]
@@ -176,8 +180,7 @@ def _scenario(kind: str, rng: np.random.Generator, number: int) -> Scenario:
             drive=Drive(top_speed_m_s=float(rng.uniform(1.5, 4.0)), turn_radius_m=3.0),
             imus=Board(count=int(rng.choice([1, 4])), pitch_m=0.0),
             wheels=tuple(
-                WheelModule(name=name, position_m=place, chips=1)
-                for name, place in (("left", left), ("right", right))
+                WheelModule(name=name, position_m=place, chips=1) for name, place in (("left", left), ("right", right))
             ),
         )
     return Scenario(**common, static_s=0.0, imus=Board(count=int(rng.choice([1, 2, 4, 8, 16]))))
