@@ -98,6 +98,12 @@ class Outcome:
     level: str = ""
     """of the verdict"""
 
+    def slim(self) -> Outcome:
+        """Return it without the data of the recording."""
+        recording = self.case.recording
+        empty = replace(recording, imus=(), gnss=None, reference=None)
+        return replace(self, case=replace(self.case, recording=empty))
+
 
 def case(number: int) -> Case:
     """Return the start of that number."""
