@@ -617,3 +617,18 @@ def test_steady_acceleration_is_no_standstill() -> None:
     assert find_standstill(quiet, None, True, 0.1) is None
     quiet_rows[:, 3] = 0.0
     assert find_standstill(quiet, None, True, 0.1) is not None
+
+
+@pytest.mark.parametrize("at", [0.01, 8.0])
+def test_a_heading_of_one_instant_is_carried_to_the_start(at: float) -> None:
+    turning = path(Profile(Swing(10.0), Swing(0.02), Swing(-0.03), Swing(-2.0, 0.1)), duration=20.0)
+    heading = float(turning.truth(np.array([at])).attitude[0, 2])
+    options = StartOptions(time=4.0, heading=heading, heading_time=at)
+    start = found(replace(drive_of(turning), start=options))
+    assert off_by(start.attitude[2], turning.truth(np.array([start.time])).attitude[0, 2]) < 0.5
+    assert start.attitude_std[2] >= 1.0 * DEG
+
+
+def test_a_heading_of_an_instant_without_data_is_refused() -> None:
+    with pytest.raises(InputError, match="the heading is that at 99"):
+        found(replace(drive_of(leaving(12.0)), start=StartOptions(heading=1.0, heading_time=99.0)))

@@ -152,9 +152,8 @@ def _flights(progress: Progress) -> tuple[dict[str, Row] | None, str]:
     except InputError as error:
         return None, str(error)
     flown = run_all([partial(_fly, folder, row) for row in rows], progress=progress)
-    return {
-        way: _flight_row(flown, way) for way in WAYS
-    }, "of the aircraft's own attitude, which is good to some degrees"
+    found = {way: _flight_row(flown, way) for way in WAYS}
+    return found, "against the aircraft's own attitude, which is good to some degrees"
 
 
 def _fly(folder: Path, row: flights.Row, progress: Progress) -> dict[str, Flown]:
