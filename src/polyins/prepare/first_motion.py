@@ -44,8 +44,8 @@ FEWEST = 4
 """fixes"""
 SETTLING = AROUND // 2
 """fixes after a window, until which its last ones may still turn out to lie"""
-TWICE = np.sqrt(2.0)
-"""times the std: the filter will see the same fixes again"""
+AGAIN = 2.0
+"""times the std: the filter sees the same fixes again, and then claims 1 / sqrt(1 + 1 / 4) of what they earned"""
 LEAST_TILT_STD = 0.1 * DEG
 LEAST_VELOCITY_STD = 0.05  # m/s
 MOVES = 6.0
@@ -201,7 +201,7 @@ class Beginning:
         C = one.C_nb
         roll, pitch = np.arctan2(C[2, 1], C[2, 2]), -np.arcsin(np.clip(C[2, 0], -1.0, 1.0))
         swing = C @ np.cross(search.imu.rate - one.x[BG], search.imu.point)
-        std = TWICE * one.std(PHI)
+        std = AGAIN * one.std(PHI)
         std[:2] = np.maximum(std[:2], LEAST_TILT_STD)
         return FirstMotion(
             time=time,
@@ -209,9 +209,9 @@ class Beginning:
             attitude=np.array([roll, pitch, one.heading]),
             attitude_std=std,
             velocity=one.x[V] - swing,
-            velocity_std=np.maximum(TWICE * one.std(V), LEAST_VELOCITY_STD),
+            velocity_std=np.maximum(AGAIN * one.std(V), LEAST_VELOCITY_STD),
             gyro_bias=one.x[BG],
-            gyro_bias_std=TWICE * one.std(BG),
+            gyro_bias_std=AGAIN * one.std(BG),
             told_by=told[0],
             decided=told[1],
         )
