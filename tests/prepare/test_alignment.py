@@ -285,12 +285,12 @@ def test_a_given_standstill_needs_data() -> None:
 
 @pytest.mark.parametrize("turn", [0.0, 70.0, -160.0])
 @pytest.mark.parametrize("count", [1, 3])
-def test_the_heading_is_the_course_less_what_the_array_turned_since(turn: float, count: int) -> None:
+def test_the_heading_is_that_under_way_less_what_the_array_turned_since(turn: float, count: int) -> None:
     start = found(drive_of(leaving(12.0, turn=turn * DEG), count=count))
     assert start.time < 12.2
     np.testing.assert_allclose(np.degrees(start.attitude), [np.degrees(0.02), np.degrees(0.03), 30.0], atol=0.3)
-    assert start.sources["heading"].startswith("GNSS course from ")
-    assert 1.9 * DEG < start.attitude_std[2] < 8.0 * DEG
+    assert start.sources["heading"].startswith("GNSS accelerations from ")
+    assert 0.3 * DEG < start.attitude_std[2] < 8.0 * DEG
 
 
 def test_a_gyro_bias_does_not_turn_the_heading() -> None:
@@ -464,7 +464,7 @@ def test_fixes_that_tell_the_truth_are_taken_as_they_are() -> None:
     for time in (0.5, 2.0, 3.5, 5.5):
         start = found(replace(recording, gnss=gnss, start=StartOptions(time=time, heading=1.5)))
         assert start.sources["position"] == "GNSS"
-        assert start.sources["velocity"] == "GNSS"
+        assert start.sources["velocity"] == "GNSS, fixes in motion"
         np.testing.assert_array_equal(start.position_std, 0.02)
 
 
@@ -617,3 +617,18 @@ def test_steady_acceleration_is_no_standstill() -> None:
     assert find_standstill(quiet, None, True, 0.1) is None
     quiet_rows[:, 3] = 0.0
     assert find_standstill(quiet, None, True, 0.1) is not None
+
+
+@pytest.mark.parametrize("at", [0.01, 8.0])
+def test_a_heading_of_one_instant_is_carried_to_the_start(at: float) -> None:
+    turning = path(Profile(Swing(10.0), Swing(0.02), Swing(-0.03), Swing(-2.0, 0.1)), duration=20.0)
+    heading = float(turning.truth(np.array([at])).attitude[0, 2])
+    options = StartOptions(time=4.0, heading=heading, heading_time=at)
+    start = found(replace(drive_of(turning), start=options))
+    assert off_by(start.attitude[2], turning.truth(np.array([start.time])).attitude[0, 2]) < 0.5
+    assert start.attitude_std[2] >= 1.0 * DEG
+
+
+def test_a_heading_of_an_instant_without_data_is_refused() -> None:
+    with pytest.raises(InputError, match="the heading is that at 99"):
+        found(replace(drive_of(leaving(12.0)), start=StartOptions(heading=1.0, heading_time=99.0)))

@@ -64,6 +64,8 @@ class StartEntry(Section):
     """deg"""
     heading_deg: Number | None = None
     """deg, clockwise from north"""
+    heading_time_s: Number | None = None
+    """s: when the heading was that; the gyros carry it to the start; without it at the start"""
     heading_from: Literal["auto", "value", "gnss-course", "reference"] = "auto"
     """auto: the first of the others that the data allow"""
     static_interval_s: Pair | None = None

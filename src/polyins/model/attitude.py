@@ -49,10 +49,15 @@ def quaternions(euler: Array) -> Array:
 
 def product(first: Array, second: Array) -> Array:
     """Return the quaternions of the second rotations after the first ones, about the axes that these turned to."""
-    a, b = first[:, 1:], second[:, 1:]
-    scalar = first[:, 0] * second[:, 0] - np.sum(a * b, axis=1)
-    vector = first[:, :1] * b + second[:, :1] * a + np.cross(a, b)
-    return np.column_stack([scalar, vector])
+    # by components: np.cross takes several times as long
+    w, x, y, z = first.T
+    v, a, b, c = second.T
+    found = np.empty((len(first), 4))
+    found[:, 0] = w * v - (x * a + y * b + z * c)
+    found[:, 1] = w * a + v * x + (y * c - z * b)
+    found[:, 2] = w * b + v * y + (z * a - x * c)
+    found[:, 3] = w * c + v * z + (x * b - y * a)
+    return found
 
 
 def of_rotation_vectors(rotations: Array) -> Array:

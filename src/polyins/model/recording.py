@@ -122,6 +122,8 @@ class StartOptions:
     """rad, shape (2,)"""
     heading: float | None = None
     """rad"""
+    heading_time: float | None = None
+    """s: when it was that; None: at the start"""
     heading_from: str = "auto"
     """value, gnss-course, reference, or auto: the first of these that the data allow"""
     static_interval: tuple[float, float] | None = None

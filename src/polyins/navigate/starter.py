@@ -185,6 +185,9 @@ class Starter:
         start = self._found(until)
         if start is None or self._is_given():
             return start
+        if not start.decided:
+            self.why, self.found = "further fixes may still tell the heading better", None
+            return None
         if self.found is None or not same(self.found[1], start):
             self.found = until, start
         if until - self.found[0] >= SETTLED:

@@ -14,6 +14,8 @@ from polyins.model.attitude import euler_angles, in_succession, of_rotation_vect
 from polyins.model.geodesy import displacement, metres_per_unit
 from polyins.model.recording import GnssStream, Recording, StartOptions
 from polyins.model.rig import DEG, Rig
+from polyins.prepare.first_motion import Beginning, FirstMotion
+from polyins.prepare.in_motion import Known
 from polyins.prepare.timesync import Aligned
 from polyins.prepare.under_way import AROUND, HARDEST, GroundMotion, find_motion
 
@@ -29,6 +31,9 @@ SLOW = 1.0  # m/s: what drifts that fast has to be told from rest
 LONGEST_STANDSTILL = 60.0  # s
 FARTHEST_START = 10e3  # m from GNSS: farther away it is another place
 LEAST_LEFT = 1.0  # s, of data after the start
+STANDSTILL_SPEED = 0.05  # m/s: std at a standstill
+MISALIGNED = 0.02
+"""rad: by that IMUs of an array may look elsewhere than their mounts say"""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,8 @@ class Start:
     """roll, pitch, heading of each IMU of a rig with wheels, rad, shape (N, 3)"""
     fix_std: Array | None = None
     """of a fix as they scatter at a standstill, m, shape (3,); None: there is none"""
+    decided: bool = True
+    """whether further data would leave it as it is"""
 
     @classmethod
     def known(
@@ -151,6 +158,8 @@ class _Search:
         self.fixes = velocities_from_positions(recording.gnss, recording.geodetic) if recording.gnss else None
         self.motions: dict[float, GroundMotion | None] = {}
         """under way from a time on"""
+        self.first: FirstMotion | None = None
+        """what the fixes tell of the state, where they are asked"""
 
     def run(self) -> Start:
         still = self._standstill()
@@ -173,6 +182,8 @@ class _Search:
             position_std = np.sqrt(position_std**2 + around**2 + tilted**2 + over**2)
         if still and self.options.estimate_gyro_bias:
             self._gyro_biases(still, attitude, position)
+        elif self.first is not None and self.options.estimate_gyro_bias:
+            self._gyro_biases_in_motion(self.first)
         else:
             largest = self.error_std[:, :3].max() / DEG
             self.sources["gyro_bias"] = f"configuration, std up to {largest:.3g} deg/s"
@@ -189,6 +200,7 @@ class _Search:
             imu_error_std=self.error_std,
             sources=self.sources,
             fix_std=fix_std,
+            decided=self.first is None or self.first.decided,
         )
 
     def _standstill(self) -> tuple[float, float] | None:
@@ -204,7 +216,9 @@ class _Search:
         if nothing_left or self.options.heading_from == "reference":
             return None
         bias_std = float(self.error_std[:, 3:6].mean()) / np.sqrt(len(self.error_std))
-        found = find_standstill(self.aligned, self.fixes, self.recording.geodetic, 4.0 * bias_std)
+        # a wheel that turns shows it at any speed
+        fixes = None if any(imu.wheel for imu in self.recording.rig.imus) else self.fixes
+        found = find_standstill(self.aligned, fixes, self.recording.geodetic, 4.0 * bias_std)
         if found and self._moves_before(found[0]):
             return None
         if found:
@@ -212,12 +226,12 @@ class _Search:
         return found
 
     def _moves_before(self, time: float) -> bool:
-        """Whether the array is under way, with a heading, before it stands still."""
+        """Whether fixes tell how the array is under way before it stands still."""
         first = float(self.aligned.time[0])
-        if time - first < WINDOW or self.fixes is None or self.options.time is not None:
+        if time - first < WINDOW or self.recording.gnss is None or self.options.time is not None:
             return False
-        motion = self._motion(first, None)
-        return motion is not None and motion.time < time
+        motion = self._found_motion(first, None)
+        return motion is not None and motion.until <= time
 
     def _time(self, still: tuple[float, float] | None) -> float:
         first, last = self.aligned.time[0], self.aligned.time[-1]
@@ -228,13 +242,20 @@ class _Search:
             if self.recording.gnss is not None and self.options.position is None:
                 wanted = max(wanted, float(self.recording.gnss.time[0]))
         elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
-            wanted, self.sources["time"] = self._under_way(float(first), None).time, UNDER_WAY
+            self.first = self._first_motion(float(first), None)
+            return self._epoch(self.first.time, UNDER_WAY)
         elif self.fixes is not None and self.options.position is None:
             # between two fixes the position would be off by what the array accelerates there
             later = self.fixes.time[self.fixes.time >= first]
             wanted, self.sources["time"] = float(later[0]) if later.size else first, "first fix"
         else:
             wanted, self.sources["time"] = first, "first epoch"
+        return self._epoch(float(wanted), self.sources["time"])
+
+    def _epoch(self, wanted: float, source: str) -> float:
+        """Return the first epoch from a time on, which has to be within the data."""
+        first, last = self.aligned.time[0], self.aligned.time[-1]
+        self.sources["time"] = source
         if not first <= wanted <= last - LEAST_LEFT:
             raise InputError(
                 f"start: time {wanted:.3f} s; expected within the IMU data, {first:.3f} to {last:.3f} s,"
@@ -242,14 +263,41 @@ class _Search:
             )
         return float(self.aligned.time[np.searchsorted(self.aligned.time, wanted)])
 
-    def _under_way(self, after: float, still: tuple[float, float] | None) -> GroundMotion:
-        motion = self._motion(after, still)
-        if motion is None:
+    def _first_motion(self, begin: float, still: tuple[float, float] | None) -> FirstMotion:
+        """Return what the fixes tell of the state at a time, or later; raise InputError where they tell no heading."""
+        found = self._found_motion(begin, still)
+        if found is None:
             raise InputError(
                 "start: no heading: GNSS does not tell one, since nothing moves far enough against the noise of its"
-                " fixes; expected start.heading_deg"
+                " fixes, or it may go sideways; expected start.heading_deg"
             )
-        return motion
+        return found
+
+    def _found_motion(self, begin: float, still: tuple[float, float] | None) -> FirstMotion | None:
+        assert self.recording.gnss is not None
+        known = Known()
+        if still and still[0] <= begin <= still[1] + 0.5:
+            known = Known(velocity=np.zeros(3), velocity_std=STANDSTILL_SPEED)
+        begin = max(begin, float(self.recording.gnss.time[0]))
+        return self._beginning(still).find(begin, known, lambda time, until: self._course(time, until, still))
+
+    def _beginning(self, still: tuple[float, float] | None) -> Beginning:
+        """Return the search for it, with what a standstill shows of the gyros and of the noise of the fixes."""
+        assert self.recording.gnss is not None
+        if not still:
+            return Beginning(self.recording, self.aligned, self.errors, self.error_std)
+        errors, std = self.errors.copy(), self.error_std.copy()
+        errors[:, :3] += self._mean(*still)[0]
+        std[:, :3] *= 0.1
+        return Beginning(self.recording, self.aligned, errors, std)
+
+    def _course(self, time: float, until: float, still: tuple[float, float] | None) -> tuple[float, float] | None:
+        """Return the heading at a time, and its std, by the course over ground up to another."""
+        motion = self._motion(time, still)
+        if motion is None or motion.until > until:
+            return None
+        turned, drift = self._turned(time, motion.time, still)
+        return motion.heading - turned, float(np.hypot(motion.heading_std, drift))
 
     def _motion(self, after: float, still: tuple[float, float] | None) -> GroundMotion | None:
         """Return the first motion from a time on, with the gyros' biases of a standstill if there was one."""
@@ -302,7 +350,7 @@ class _Search:
             return self.options.velocity, np.full(3, 0.1)
         if still and still[0] <= time <= still[1] + 0.5:
             self.sources["velocity"] = "standstill"
-            return np.zeros(3), np.full(3, 0.05)
+            return np.zeros(3), np.full(3, STANDSTILL_SPEED)
         if self.options.heading_from == "reference" and reference is not None:
             self.sources["velocity"] = "reference"
             if reference.velocity is None:
@@ -310,10 +358,10 @@ class _Search:
             else:
                 velocity = _interpolate(time, reference.time, reference.velocity)
             return velocity, np.full(3, 0.3)
-        motion = self.motions.get(float(self.aligned.time[0]))
-        if motion is not None and abs(motion.time - time) < WINDOW and self.sources["time"] == UNDER_WAY:
-            self.sources["velocity"] = "GNSS, fixes under way"
-            return motion.velocity + motion.acceleration * (time - motion.time), motion.velocity_std
+        if self._tells(time, still):
+            assert self.first is not None
+            self.sources["velocity"] = "GNSS, fixes in motion"
+            return self.first.velocity, self.first.velocity_std
         if self.fixes is not None and self.fixes.velocity is not None:
             self.sources["velocity"] = "GNSS"
             return self._velocity_from_fixes(time)
@@ -346,15 +394,23 @@ class _Search:
             bias_std = self.error_std[:, 3:6].mean() / 9.8
             return level(force.mean(axis=0)), float(max(0.1 * DEG, bias_std))
         self.sources["roll_pitch"] = "levelled in motion, acceleration from GNSS"
-        motion = self.motions.get(float(self.aligned.time[0]))
-        if motion is not None and abs(motion.time - time) < WINDOW:
-            _, force, _ = self._mean(max(time - 0.5, self.aligned.time[0]), time + 0.5)
-            bias_std = self.error_std[:, 3:6].mean()
-            tilt_std = float(np.hypot(motion.acceleration_std, bias_std)) / 9.8 + 1.0 * DEG
-            return level(force.mean(axis=0), motion.acceleration, motion.heading), tilt_std
+        if self._tells(time, still):
+            assert self.first is not None
+            roll, pitch, _ = self.first.attitude
+            return (float(roll), float(pitch)), float(self.first.attitude_std[:2].max())
         _, force, _ = self._mean(time - 0.5, time + 0.5)
         heading = float(np.arctan2(velocity[1], velocity[0]))
         return level(force.mean(axis=0), self._acceleration(time), heading), 3.0 * DEG
+
+    def _tells(self, time: float, still: tuple[float, float] | None) -> bool:
+        """Whether fixes in motion tell the state at a time; they are asked where no standstill does."""
+        if self.first is None and self.recording.gnss is not None and self.options.heading_from != "reference":
+            known = self._known_heading(time, still)
+            if known is None:
+                self.first = self._first_motion(time, still)
+            else:
+                self.first = self._beginning(still).at(time, Known(*known), lambda *_: None)
+        return self.first is not None and abs(self.first.time - time) <= 2.0 / self.aligned.rate_hz
 
     def _acceleration(self, time: float) -> Array:
         if self.fixes is None or self.fixes.velocity is None:
@@ -366,9 +422,9 @@ class _Search:
         self, time: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float], velocity: Array
     ) -> tuple[float, float]:
         wanted, reference = self.options.heading_from, self.recording.reference
-        if self.options.heading is not None and wanted in ("auto", "value"):
-            self.sources["heading"] = "given"
-            return self.options.heading, 1.0 * DEG
+        known = self._known_heading(time, still)
+        if known is not None:
+            return known
         if wanted == "value":
             raise InputError("start: heading_from is value; expected start.heading_deg")
         if wanted == "reference" or (wanted == "auto" and self.fixes is None):
@@ -379,17 +435,51 @@ class _Search:
             return float(_interpolate(time, reference.time, unwrapped)[0]), 2.0 * DEG
         if self.fixes is None:
             raise InputError("start: heading_from is gnss-course, but there is no GNSS")
-        first = float(self.aligned.time[0])
-        under_way = not still and self.sources["time"] == UNDER_WAY
-        motion = self._under_way(first if under_way else time, still)
-        turning = self._turning(min(time, motion.time), np.array([min(time, motion.time), motion.time]), still)
-        turned = float(np.diff(turning(np.array([min(time, motion.time), motion.time])))[0])
-        drift = float(self.error_std[:, :3].mean()) * (0.1 if still else 1.0) * (motion.time - min(time, motion.time))
-        self.sources["heading"] = (
-            f"GNSS course from {motion.time:.3f} to {motion.until:.3f} s,"
-            f" less {turned / DEG:.1f} deg turned since the start"
-        )
-        return motion.heading - turned, float(np.hypot(motion.heading_std, drift))
+        if self.first is None:
+            self.first = self._first_motion(time, still)
+        first = self.first
+        turned, drift = self._turned(time, first.time, still)
+        self.sources["heading"] = f"{first.told_by} from {first.time:.3f} to {first.until:.3f} s"
+        if first.time > time + WINDOW:
+            self.sources["heading"] += f", less {turned / DEG:.1f} deg turned since the start"
+        return float(first.attitude[2]) - turned, float(np.hypot(first.attitude_std[2], drift))
+
+    def _known_heading(self, time: float, still: tuple[float, float] | None) -> tuple[float, float] | None:
+        """Return the heading at a time, and its std, of one that is given or that a sensor shows, or None."""
+        wanted, options = self.options.heading_from, self.options
+        if options.heading is not None and wanted in ("auto", "value"):
+            self.sources["heading"] = "given"
+            std = 1.0 * DEG if options.attitude_std is None else float(options.attitude_std[2])
+            return self._carried(options.heading, std, options.heading_time, time, still)
+        shown = next((stream for stream in self.recording.aiding if stream.kind == "heading"), None)
+        if wanted != "auto" or shown is None or not len(shown.time):
+            return None
+        first = int(np.argmin(np.abs(shown.time - time)))
+        offsets = [sensor.offset_std for sensor in self.recording.rig.sensors if sensor.kind == "heading"]
+        std = float(np.hypot(shown.std[first, 0], max(offsets, default=0.0)))
+        self.sources["heading"] = "sensor of heading"
+        return self._carried(float(shown.value[first]), std, float(shown.time[first]), time, still)
+
+    def _carried(
+        self, heading: float, std: float, at: float | None, time: float, still: tuple[float, float] | None
+    ) -> tuple[float, float]:
+        """Return the heading at a time, and its std, of the one at another, by what the gyros turned in between."""
+        if at is None or at == time:
+            return heading, std
+        if not self.aligned.time[0] <= at <= self.aligned.time[-1]:
+            raise InputError(f"start: the heading is that at {at:.3f} s; expected a time within the data of the IMUs")
+        turned, drift = self._turned(time, at, still)
+        self.sources["heading"] += f" at {at:.3f} s, less {turned / DEG:.1f} deg turned since the start"
+        return heading - turned, float(np.hypot(std, drift))
+
+    def _turned(self, begin: float, end: float, still: tuple[float, float] | None) -> tuple[float, float]:
+        """Return how far the heading has turned from one time to another, and its std, rad."""
+        first, last = min(begin, end), max(begin, end)
+        if last - first < 2.0 / self.aligned.rate_hz:
+            return 0.0, 0.0
+        turned = float(np.diff(self._turning(first, np.array([first, last]), still)(np.array([first, last])))[0])
+        drift = float(self.error_std[:, :3].mean()) * (0.1 if still else 1.0) * (last - first)
+        return (turned if end > begin else -turned), drift
 
     def _position(self, time: float, attitude: Array) -> tuple[Array, Array]:
         if self.options.position is not None:
@@ -473,6 +563,21 @@ class _Search:
                 imu.noise.angle_random_walk / np.sqrt(duration), 0.1 * imu.noise.gyro_bias_std
             )
         self.sources["gyro_bias"] = f"mean of {duration:.1f} s at standstill"
+
+    def _gyro_biases_in_motion(self, first: FirstMotion) -> None:
+        """Take what the fixes tell of the mean bias, and what each gyro shows beyond the mean of all."""
+        bodies = self._bodies()
+        rates, _, duration = self._mean(first.time, first.until)
+        mean = rates[bodies].mean(axis=0)
+        for i in bodies:
+            imu = self.recording.rig.imus[i]
+            white = imu.noise.angle_random_walk / np.sqrt(duration)
+            others = (len(bodies) > 1) * np.hypot(white, MISALIGNED * np.abs(mean).max())
+            std = np.sqrt(first.gyro_bias_std**2 + others**2 + (0.1 * imu.noise.gyro_bias_std) ** 2)
+            self.errors[i, :3] += first.gyro_bias + rates[i] - mean
+            self.error_std[i, :3] = np.minimum(std, self.error_std[i, :3])
+        largest = self.error_std[bodies, :3].max() / DEG
+        self.sources["gyro_bias"] = f"fixes in motion, std up to {largest:.3g} deg/s"
 
 
 class _RollingSearch(_Search):
@@ -581,8 +686,7 @@ def find_standstill(
     edges = aligned.time[np.minimum(np.arange(count + 1) * tenths * tenth, len(aligned.time) - 1)]
     if fixes is not None and fixes.velocity is not None:
         speed = np.linalg.norm(usual_velocity(fixes), axis=1)
-        noise = 4.0 * fixes.position_std.max(axis=1)
-        moving = fixes.time[speed > np.maximum(0.3, noise)]
+        moving = fixes.time[speed > np.maximum(0.3, 4.0 * _speed_noise(fixes))]
         for t in moving:
             still[(edges[:-1] - 1.0 < t) & (t < edges[1:] + 1.0)] = False
     runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
@@ -595,6 +699,15 @@ def find_standstill(
         ):
             return float(edges[begin]), until
     return None
+
+
+def _speed_noise(fixes: GnssStream) -> Array:
+    """Return the std of the speed that fixes give, m/s, shape (M,), of differences where the receiver gives none."""
+    if fixes.velocity_std is not None:
+        return np.asarray(np.linalg.norm(fixes.velocity_std, axis=1))
+    steps = np.diff(fixes.time)
+    over = np.concatenate([steps[:1], steps[1:] + steps[:-1], steps[-1:]])
+    return np.asarray(np.linalg.norm(fixes.position_std, axis=1) * np.sqrt(2.0) / over)
 
 
 def feels_gravity(aligned: Aligned, begin: float, end: float, bias: float) -> bool:

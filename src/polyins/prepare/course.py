@@ -24,6 +24,12 @@ FARTHER = 1.3
 """That many times the length by GNSS is farther than it by dead reckoning, whose radii may be wrong by a tenth."""
 SHORTEST = 5.0
 LEAST_STD = 0.1 * DEG
+BY_CHANCE = 2.0
+"""sigma of a mean square"""
+DRIFT_STD = 1.0 * DEG
+"""of the heading over the length, where the noise of fixes hides it"""
+AROUND = 5
+"""fixes: their median outvotes two that lie"""
 
 
 @dataclass(frozen=True)
@@ -79,8 +85,7 @@ def find(recording: Recording, begin: float, navigate: Callable[[Recording], Tra
     for _ in range(3):
         angle, residual = _rotation(track, fixes, kept)
         kept = residual <= 3.0 * np.median(residual) + 1e-6
-    spread = np.sqrt(np.sum((track[kept] - track[kept].mean(axis=0)) ** 2))
-    std = max(LEAST_STD, float(np.sqrt(np.mean(residual[kept] ** 2)) / spread * np.sqrt(2.0)))
+    std = max(LEAST_STD, _std(track, residual, _noise(gnss)))
     return Course(angle, std, f"dead-reckoned track turned onto GNSS over {reach:.0f} m")
 
 
@@ -125,3 +130,24 @@ def _rotation(track: Array, fixes: Array, kept: NDArray[np.bool_]) -> tuple[floa
     c, s = np.cos(angle), np.sin(angle)
     turned = np.column_stack([c * a[:, 0] - s * a[:, 1], s * a[:, 0] + c * a[:, 1]])
     return angle, np.linalg.norm(turned - b, axis=1)
+
+
+def _noise(gnss: GnssStream) -> float:
+    """Return the usual variance of a fix in the horizontal plane, m^2."""
+    return float(np.median(np.sum(gnss.position_std[:, :2] ** 2, axis=1)))
+
+
+def _std(track: Array, residual: Array, noise: float) -> float:
+    """Return the std of the angle, rad.
+
+    The noise of fixes is white. What is left beyond it is a drift of the heading: one that bends a straight track turns
+    its beginning by sqrt(15) times the angle under which the residuals are seen. A drift that the noise hides is as
+    large as dead reckoning may have. A fix that lies is no drift: it is outvoted by those around it.
+    """
+    count, window = len(track), min(AROUND, len(track))
+    squares = float(np.mean(np.sum((track - track.mean(axis=0)) ** 2, axis=1)))
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(residual, window), axis=1)
+    left, by_chance = float(np.mean(usual**2)), noise / np.sqrt(count)
+    drift = 15.0 * max(0.0, left - noise - BY_CHANCE * by_chance) / squares
+    hidden = min(15.0 * by_chance / squares, DRIFT_STD**2)
+    return float(np.sqrt(2.0 * left / count / squares + drift + hidden))

@@ -1,4 +1,4 @@
-"""The motion of an array under way: heading, velocity and acceleration from fixes, over as long as they need.
+"""The course of an array under way: its heading from fixes, over as long as they need.
 
 A vehicle moves where it looks, but for a few degrees. The gyros tell how far it has turned since its first fix, so that
 all displacements can be turned back to the heading there and added up: their sum points along it, and is the surer the
@@ -34,22 +34,10 @@ SLOWEST = 0.3
 """m/s, mean along the way: slower is standing or hovering"""
 MANY = 1500
 """fixes that are looked at: the search is over a triangle of them"""
-FITTED = 10.0
-"""s of fixes to which speed and acceleration are fitted"""
-BEND = float(np.sqrt(180.0))
-"""A parabola leaves its line by a misfit m, rms, over a time T: at the begin its slope is off by that times m / T."""
-AT_ONCE = 1.0
-"""s of fixes that tell how it turns, and where they have velocities accelerates, at the start"""
-UNSTEADY_SPEED_STD = 0.3
-"""m/s, by which a parabola misses the speed"""
-UNSTEADY_STD = 0.3
-"""m/s^2, by which the acceleration changes in that time"""
 AROUND = 5
 """fixes: their median outvotes one that lies, and the two differences in which it shows"""
 HARDEST = 5.0
 """m/s^2: what a vehicle accelerates by at most, for seconds"""
-HARDEST_STD = 2.0
-"""m/s^2, of an acceleration that fixes do not tell"""
 
 
 @dataclass(frozen=True)
@@ -62,14 +50,6 @@ class GroundMotion:
     """rad"""
     heading_std: float
     """rad"""
-    velocity: Array
-    """m/s north, east, down"""
-    velocity_std: Array
-    """m/s"""
-    acceleration: Array
-    """m/s^2 north, east, down"""
-    acceleration_std: float
-    """m/s^2"""
     until: float
     """s: the last fix that tells the heading"""
 
@@ -82,7 +62,7 @@ def find_motion(
     `turned`: how far the heading has turned at given times, rad, less a constant; `bias_std`: of the gyros, rad/s.
     """
     shown = np.flatnonzero(gnss.time >= after)[:MANY]
-    shown = shown[_agrees(gnss, geodetic, shown)]
+    shown = shown[agreeing(gnss, geodetic, shown)]
     if len(shown) < 2:
         return None
     way = _Way(gnss, geodetic, shown, turned)
@@ -98,7 +78,7 @@ def find_motion(
     return None
 
 
-def _agrees(gnss: GnssStream, geodetic: bool, shown: NDArray[np.intp]) -> NDArray[np.bool_]:
+def agreeing(gnss: GnssStream, geodetic: bool, shown: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return which fixes lie where those around them say, within what noise and acceleration allow."""
     count = len(shown)
     if count < AROUND:
@@ -161,85 +141,4 @@ class _Way:
         """Return the motion at the first of some fixes, whose last one is given."""
         along = np.exp(1j * np.angle(self.sum[last] - self.sum[first]))
         heading = float(np.angle(along * np.exp(1j * self.yaw[first])))
-        part = self._fitted(first, along)
-        after = self.time[part] - self.time[first]
-        distance = np.real((self.sum[part] - self.sum[first]) / along)
-        speed, gain, speed_std, gain_std = _speed(after, distance, float(np.median(self.std[part])))
-        sink, sink_std = self._sink(part, first)
-        soon = slice(first, max(first + 2, int(np.searchsorted(self.time, self.time[first] + AT_ONCE, "right"))))
-        rate = float(np.polyfit(self.time[soon] - self.time[first], self.yaw[soon], 1)[0])
-        ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
-        aside = np.array([-np.sin(heading), np.cos(heading), 0.0])
-        if self.given:
-            return self._given(first, soon, heading, std, last)
-        # a parabola is not how a vehicle moves for long
-        speed_std = float(np.hypot(speed_std, UNSTEADY_SPEED_STD))
-        across = max(speed_std, abs(speed) * std)
-        return GroundMotion(
-            time=float(self.time[first]),
-            heading=heading,
-            heading_std=std,
-            velocity=speed * ahead + np.array([0.0, 0.0, sink]),
-            velocity_std=np.array([across, across, max(sink_std, 0.05)]),
-            acceleration=gain * ahead + speed * rate * aside,
-            acceleration_std=gain_std,
-            until=float(self.time[last]),
-        )
-
-    def _fitted(self, first: int, along: complex) -> slice:
-        """Return the fixes that a parabola describes: fewer than ten seconds where their noise is small."""
-        duration = FITTED
-        while True:
-            end = max(first + 3, int(np.searchsorted(self.time, self.time[first] + duration, "right")))
-            part = slice(first, min(end, len(self.time)))
-            after = self.time[part] - self.time[first]
-            distance = np.real((self.sum[part] - self.sum[first]) / along)
-            if len(after) <= 4:
-                return part
-            left = distance - np.polyval(np.polyfit(after, distance, 2), after)
-            if np.sqrt(np.mean(left**2)) <= 2.0 * float(np.median(self.std[part])):
-                return part
-            duration *= 0.7
-
-    def _given(self, first: int, soon: slice, heading: float, std: float, last: int) -> GroundMotion:
-        """Return the motion where the receiver gives velocities: they tell the acceleration as well."""
-        after = self.time[soon] - self.time[first]
-        noise = self.velocity_std[first].max() / np.sqrt(float(np.sum((after - after.mean()) ** 2)))
-        return GroundMotion(
-            time=float(self.time[first]),
-            heading=heading,
-            heading_std=std,
-            velocity=self.velocity[first],
-            velocity_std=np.maximum(self.velocity_std[first], 0.05),
-            acceleration=np.polyfit(after, self.velocity[soon], 1)[0],
-            acceleration_std=float(np.hypot(noise, UNSTEADY_STD)),
-            until=float(self.time[last]),
-        )
-
-    def _sink(self, part: slice, first: int) -> tuple[float, float]:
-        if self.given:
-            return float(self.velocity[first, 2]), float(self.velocity_std[first, 2])
-        after = self.time[part] - self.time[first]
-        if len(after) < 3:
-            return float(np.diff(self.position[part, 2])[0] / np.diff(after)[0]), 2.0
-        std = float(np.median(self.std[part]))
-        line = np.polyfit(after, self.position[part, 2], 1)
-        misfit = np.sqrt(np.mean((self.position[part, 2] - np.polyval(line, after)) ** 2))
-        noise = std * 2.0 / np.sqrt(np.sum((after - after.mean()) ** 2))
-        return float(line[0]), float(np.hypot(noise, BEND * misfit / after[-1]))
-
-
-def _speed(time: Array, distance: Array, std: float) -> tuple[float, float, float, float]:
-    """Return speed and acceleration at time zero of a parabola through distances, and their std."""
-    degree = min(2, len(time) - 1)
-    design = np.vander(time, degree + 1, increasing=True)
-    covariance = np.linalg.pinv(design.T @ design) * (np.sqrt(2.0) * std) ** 2
-    fitted = np.linalg.lstsq(design, distance, rcond=None)[0]
-    speed_std = float(np.sqrt(covariance[1, 1])) + 0.05
-    if degree < 2:
-        return float(fitted[1]), 0.0, speed_std, HARDEST_STD
-    gain_std = 2.0 * float(np.sqrt(covariance[2, 2]))
-    if gain_std > HARDEST_STD:
-        line = np.polyfit(time, distance, 1)
-        return float(line[0]), 0.0, speed_std, HARDEST_STD
-    return float(fitted[1]), 2.0 * float(fitted[2]), speed_std, float(np.hypot(gain_std, UNSTEADY_STD))
+        return GroundMotion(float(self.time[first]), heading, std, float(self.time[last]))

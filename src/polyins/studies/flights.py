@@ -139,7 +139,7 @@ HEIGHT_OF_TAKEOFF = 23.0
 
 def fly(recording: Recording, row: Row) -> Iterator[Outage]:
     """Run all methods through each outage of one flight."""
-    first, last = _span(recording)
+    first, last = span(recording)
     every = 5.0 if recording.geodetic else 3.0  # the flights as recorded are long, and geodetic
     begins = np.arange(first + GNSS_BEFORE, last - LENGTHS[0] + 1e-6, every)
     for begin, generator in zip(begins, np.random.default_rng(1).spawn(len(begins)), strict=True):
@@ -147,21 +147,22 @@ def fly(recording: Recording, row: Row) -> Iterator[Outage]:
         end = begin + lengths[-1]
         run = replace(
             recording,
-            gnss=_noisy(recording, generator),
+            gnss=noisy(recording, generator),
             outages=((begin + 0.05, end + 0.05),),
             start=replace(recording.start, end_time=end + 0.02),
         )
         yield Outage(row["flight"], row["session"], _maxima(run, begin, lengths))
 
 
-def _noisy(recording: Recording, generator: np.random.Generator) -> GnssStream:
+def noisy(recording: Recording, generator: np.random.Generator) -> GnssStream:
+    """Return the fixes of a flight with noise."""
     assert recording.gnss is not None
     metres = metres_per_unit(recording.gnss.position[0], recording.geodetic)
     noise = generator.normal(0.0, NOISE, recording.gnss.position.shape) / metres
     return replace(recording.gnss, position=recording.gnss.position + noise)
 
 
-def _span(recording: Recording) -> tuple[float, float]:
+def span(recording: Recording) -> tuple[float, float]:
     """Return the time of the first fix that all IMUs see, and the end of what all streams cover."""
     assert recording.gnss is not None
     assert recording.reference is not None

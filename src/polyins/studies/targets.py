@@ -21,6 +21,12 @@ TARGETS = (
     Target("array", "polyins.studies.array:reproduce", seconds=(10, 240)),
     Target("consistency", "polyins.studies.consistency:reproduce"),
     Target(
+        "starts",
+        "polyins.studies.starts:reproduce",
+        seconds=(45, 500),
+        print_tables="polyins.studies.starts:print_tables",
+    ),
+    Target(
         "split",
         "polyins.studies.split:reproduce",
         datasets=("quadrotor", "whu-array"),
