@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import driven_vehicle
 import numpy as np
 import pytest
 from playing import Event, events, feed, play, rows
@@ -128,3 +129,30 @@ def test_a_pause_of_some_or_a_short_one_is_none(drive: Recording) -> None:
     assert restart.pauses(paused(drive, 100.0, 100.9)) == []
     (one,) = restart.pauses(paused(drive, 100.0, 150.0))
     np.testing.assert_allclose(one, (100.0, 150.0), atol=0.03)
+
+
+@pytest.mark.parametrize("method", ["enav-fusion", "nav-fusion", "nav-fusion/centralized", "imu-fusion"])
+def test_a_bridged_pause_is_covered(drive: Recording, method: str) -> None:
+    for begin in (60.0, 110.3, 201.7):
+        recording = paused(drive, begin, begin + 0.9)
+        solution = batch.run(recording, method)
+        errors = compare_to_reference(solution, recording.reference)
+        near = (errors.time > begin + 0.02) & (errors.time < begin + 5.0)
+        std = np.sqrt(euler_variance(euler_angles(solution.attitude), solution.phi_covariance))[errors.covered]
+        position_std = np.sqrt(solution.position_variance)[errors.covered]
+        assert np.abs(errors.attitude[near] / std[near]).max() < 5.0
+        assert np.abs(errors.position[near] / position_std[near]).max() < 5.0
+        assert std[near][0, 2] > np.radians(1.0)
+
+
+def test_blocks_apart_that_coasted_without_gnss_do_not_hold_it() -> None:
+    recording = driven_vehicle.drive()
+    streams = [
+        replace(stream, time=stream.time[kept], dtheta=stream.dtheta[kept], dvel=stream.dvel[kept])
+        for stream in recording.imus
+        for kept in [(stream.time < 60.0) | (stream.time > 61.0)]
+    ]
+    recording = replace(recording, imus=tuple(streams))
+    for method, expected in (("triple-ins", ["serious"]), ("body-ins", []), ("triple-ins/centralized", [])):
+        found = [one for one in batch.run(recording, method).findings if one.kind == "pause"]
+        assert [one.severity for one in found] == expected

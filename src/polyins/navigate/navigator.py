@@ -165,8 +165,10 @@ class Navigator:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What there is to say of the data and of pauses so far; `evaluation.verdict.of_live` judges the rest."""
-        part = self._record.part
-        return (*self._record.findings, *(part.findings(self._choice, self._recording) if part else ()))
+        found, part = self._record.findings, self._record.part
+        if part is None:
+            return tuple(found)
+        return (*found, *part.findings(self.method, self._choice, self._recording, self._has_fixes))
 
     @property
     def measurements(self) -> dict[str, Innovations]:
