@@ -8,7 +8,7 @@ from pathlib import Path
 import driven_vehicle
 import numpy as np
 import pytest
-from playing import Event, events, feed, play, rows
+from playing import Event, events, feed, navigator_for, play, rows
 
 from polyins.evaluation.errors import compare_to_reference
 from polyins.model.attitude import euler_angles, euler_variance
@@ -18,6 +18,9 @@ from polyins.navigate import batch, restart
 from polyins.navigate.navigator import Navigator
 from polyins.simulation.run import simulate
 from polyins.simulation.scenario import Board, Scenario
+
+COASTED = (60.0, 62.9)
+"""s: longer than the intervals at which blocks of a vehicle are compared"""
 
 
 @pytest.fixture(scope="module")
@@ -146,13 +149,17 @@ def test_a_bridged_pause_is_covered(drive: Recording, method: str) -> None:
 
 
 def test_blocks_apart_that_coasted_without_gnss_do_not_hold_it() -> None:
-    recording = driven_vehicle.drive()
-    streams = [
-        replace(stream, time=stream.time[kept], dtheta=stream.dtheta[kept], dvel=stream.dvel[kept])
-        for stream in recording.imus
-        for kept in [(stream.time < 60.0) | (stream.time > 61.0)]
-    ]
-    recording = replace(recording, imus=tuple(streams))
+    recording = paused(driven_vehicle.drive(), *COASTED)
     for method, expected in (("triple-ins", ["serious"]), ("body-ins", []), ("triple-ins/centralized", [])):
         found = [one for one in batch.run(recording, method).findings if one.kind == "pause"]
         assert [one.severity for one in found] == expected
+
+
+def test_live_wheels_coast_as_in_a_batch_run() -> None:
+    recording = paused(driven_vehicle.drive(), *COASTED)
+    prepared, whole = batch.prepare(recording, "triple-ins"), batch.run(recording, "triple-ins")
+    one = navigator_for(prepared)
+    states = play(one, prepared.recording, events(prepared.recording))
+    np.testing.assert_array_equal(list(states), whole.time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole))
+    assert {found.text for found in one.findings} == {found.text for found in whole.findings}

@@ -345,7 +345,8 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
     lanes = run.bank.lanes
     log = outputs.log[:, :, :, lanes].transpose(0, 1, 3, 2)
     rows = outcome.rows_of(run.inputs, outputs, slice(None), len(run.inputs.time) - 1)
-    aided = np.concatenate([run.aided, outcome.aided_at(rows)])
+    taken = outcome.aided_at(run.inputs.event_kind, outputs.event_status, run.inputs.event_time)
+    aided = np.concatenate([run.aided, taken])
     run.aided[:] = aided[-USUAL_AIDING:]
     return Solution(
         method=run.method.name,

@@ -603,6 +603,8 @@ class Navigator:
 
 def _states(line: Timeline, first: int) -> list[NavigatorState]:
     """Return the states at the epochs of a window from one on."""
+    if first > line.last:
+        return []
     here = slice(first, line.last + 1)
     time, rows, variances = (
         line.inputs.time[here],
@@ -611,7 +613,7 @@ def _states(line: Timeline, first: int) -> list[NavigatorState]:
     )
     time, position, velocity, attitude = line.inputs.time[here], rows[:, 0:3], rows[:, 3:6], rows[:, 6:10]
     track = Trajectory(time, position, velocity, attitude, variances[:, 0:3], variances[:, 3:6], variances[:, 6:12])
-    status = status_of(track, line.aided, line.snap) if len(time) else ()
+    status = status_of(track, line.aided, line.snap)
     return [
         NavigatorState(
             time=float(time[k]),
