@@ -240,4 +240,4 @@ def test_live_data_tell_what_is_not_looked_at(drive: Path, tmp_path: Path, monke
     with pytest.raises(InputError, match="without a start"):
         run(Options(drive, tmp_path, sources=("-",)))
     warnings = summary(tmp_path)["warnings"]
-    assert [text.split(":")[0] for text in warnings] == ["outages", "reference"]
+    assert [text.split(":")[0] for text in warnings] == ["outages", "reference", "no start was found"]

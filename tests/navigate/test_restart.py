@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import driven_vehicle
 import numpy as np
 import pytest
-from playing import Event, events, feed, play, rows
+from playing import Event, events, feed, navigator_for, play, rows
 
 from polyins.evaluation.errors import compare_to_reference
 from polyins.model.attitude import euler_angles, euler_variance
@@ -17,6 +18,9 @@ from polyins.navigate import batch, restart
 from polyins.navigate.navigator import Navigator
 from polyins.simulation.run import simulate
 from polyins.simulation.scenario import Board, Scenario
+
+COASTED = (60.0, 62.9)
+"""s: longer than the intervals at which blocks of a vehicle are compared"""
 
 
 @pytest.fixture(scope="module")
@@ -128,3 +132,34 @@ def test_a_pause_of_some_or_a_short_one_is_none(drive: Recording) -> None:
     assert restart.pauses(paused(drive, 100.0, 100.9)) == []
     (one,) = restart.pauses(paused(drive, 100.0, 150.0))
     np.testing.assert_allclose(one, (100.0, 150.0), atol=0.03)
+
+
+@pytest.mark.parametrize("method", ["enav-fusion", "nav-fusion", "nav-fusion/centralized", "imu-fusion"])
+def test_a_bridged_pause_is_covered(drive: Recording, method: str) -> None:
+    for begin in (60.0, 110.3, 201.7):
+        recording = paused(drive, begin, begin + 0.9)
+        solution = batch.run(recording, method)
+        errors = compare_to_reference(solution, recording.reference)
+        near = (errors.time > begin + 0.02) & (errors.time < begin + 5.0)
+        std = np.sqrt(euler_variance(euler_angles(solution.attitude), solution.phi_covariance))[errors.covered]
+        position_std = np.sqrt(solution.position_variance)[errors.covered]
+        assert np.abs(errors.attitude[near] / std[near]).max() < 5.0
+        assert np.abs(errors.position[near] / position_std[near]).max() < 5.0
+        assert std[near][0, 2] > np.radians(1.0)
+
+
+def test_blocks_apart_that_coasted_without_gnss_do_not_hold_it() -> None:
+    recording = paused(driven_vehicle.drive(), *COASTED)
+    for method, expected in (("triple-ins", ["serious"]), ("body-ins", []), ("triple-ins/centralized", [])):
+        found = [one for one in batch.run(recording, method).findings if one.kind == "pause"]
+        assert [one.severity for one in found] == expected
+
+
+def test_live_wheels_coast_as_in_a_batch_run() -> None:
+    recording = paused(driven_vehicle.drive(), *COASTED)
+    prepared, whole = batch.prepare(recording, "triple-ins"), batch.run(recording, "triple-ins")
+    one = navigator_for(prepared)
+    states = play(one, prepared.recording, events(prepared.recording))
+    np.testing.assert_array_equal(list(states), whole.time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole))
+    assert {found.text for found in one.findings} == {found.text for found in whole.findings}

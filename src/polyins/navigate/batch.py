@@ -346,7 +346,8 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
     lanes = run.bank.lanes
     log = outputs.log[:, :, :, lanes].transpose(0, 1, 3, 2)
     rows = outcome.rows_of(run.inputs, outputs, slice(None), len(run.inputs.time) - 1)
-    aided = np.concatenate([run.aided, outcome.aided_at(rows)])
+    taken = outcome.aided_at(run.inputs.event_kind, outputs.event_status, run.inputs.event_time)
+    aided = np.concatenate([run.aided, taken])
     run.aided[:] = aided[-USUAL_AIDING:]
     return Solution(
         method=run.method.name,
@@ -371,7 +372,11 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
             *notes(recording.warnings),
             *recording.findings,
             *aligned.findings,
-            *(silences(run.choice, recording, aligned) if recording.rig.has_wheels else ()),
+            *(
+                silences(run.method, run.choice, recording, aligned, recording.gnss is not None)
+                if recording.rig.has_wheels
+                else ()
+            ),
         ),
     )
 
@@ -392,9 +397,13 @@ def offsets_of(run: Prepared, lanes: list[int]) -> dict[str, OffsetEstimate]:
     return found
 
 
-def silences(choice: Choice, recording: Recording, aligned: Aligned) -> tuple[Finding, ...]:
-    """Return which IMUs were silent for how long, of a choice and what became of them."""
-    found = []
+def silences(row: Method, choice: Choice, recording: Recording, aligned: Aligned, fixes: bool) -> tuple[Finding, ...]:
+    """Return which IMUs of a choice were silent for how long and what became of it; `fixes`: whether there is GNSS."""
+    found: list[Finding] = []
+    if not fixes and not row.joined and len(choice.blocks) > 1:
+        every = stretches(np.asarray(aligned.missing.all(axis=1)))
+        gaps = [(float(aligned.time[max(first - 1, 0)]), float(aligned.time[end - 1])) for first, end in every]
+        found += restart.coasted(gaps)
     for i, imu in enumerate(recording.rig.imus):
         for first, end in stretches(aligned.missing[:, i]):
             begin, last = aligned.time[max(first - 1, 0)], aligned.time[end - 1]

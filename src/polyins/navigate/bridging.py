@@ -1,9 +1,9 @@
 """What a short pause of all IMUs leaves unknown, as variances that are added where it begins: a fix may lie in it.
 
 An array is carried over it by the mean of the rates on both sides. What the rates do in between is a random walk known
-at both ends, of which the integral over a pause of length L has the variance q L^3 / 12. The strength q is what a
-vehicle that begins or ends a turn shows, or what the rates on both sides differ by, if that is more. A vehicle
-on wheels goes on straight at the speed it had: it turns and brakes as it likes.
+at both ends, of which the integral over a pause of length L has the variance q L^3 / 12, and the double integral
+q L^5 / 45. The strength q is what a vehicle that begins or ends a turn shows, or what the rates on both sides differ
+by, if that is more. A vehicle on wheels goes on straight at the speed it had: it turns and brakes as it likes.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def of_array(time: Array, increments: Array, nothing: NDArray[np.bool_], snap: f
     change = 2.0 * np.linalg.norm((increments[found].mean(axis=2) / length[:, None] - before).reshape(-1, 2, 3), axis=2)
     walk = np.maximum(np.array([RATE_CHANGE, FORCE_CHANGE]) ** 2, change**2 / length[:, None])
     angle, velocity = (walk * length[:, None] ** 3 / 12.0).T
-    return _noise(time[found - 1], np.column_stack([velocity * length**2 / 3.0, velocity, angle, angle]), snap)
+    return _noise(time[found - 1], np.column_stack([velocity * length**2 * 4.0 / 15.0, velocity, angle, angle]), snap)
 
 
 def of_wheels(time: Array, nothing: NDArray[np.bool_], snap: float) -> Events:

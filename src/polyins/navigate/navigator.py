@@ -172,7 +172,7 @@ class Navigator:
     def findings(self) -> tuple[Finding, ...]:
         """What there is to say of the data and of pauses so far; `evaluation.verdict.of_live` judges the rest."""
         part = self._record.part
-        of_part = part.findings(self._choice, self._recording) if part else ()
+        of_part = part.findings(self.method, self._choice, self._recording, self._has_fixes) if part else ()
         refusals = self._refusals if self._starter is None else self._starter.refusals
         return (*refusals.findings(), *self._record.findings, *of_part)
 
@@ -636,6 +636,8 @@ class Navigator:
 
 def _states(line: Timeline, first: int) -> list[NavigatorState]:
     """Return the states at the epochs of a window from one on."""
+    if first > line.last:
+        return []
     here = slice(first, line.last + 1)
     time, rows, variances = (
         line.inputs.time[here],
@@ -644,7 +646,7 @@ def _states(line: Timeline, first: int) -> list[NavigatorState]:
     )
     time, position, velocity, attitude = line.inputs.time[here], rows[:, 0:3], rows[:, 3:6], rows[:, 6:10]
     track = Trajectory(time, position, velocity, attitude, variances[:, 0:3], variances[:, 3:6], variances[:, 6:12])
-    status = status_of(track, line.aided, line.snap) if len(time) else ()
+    status = status_of(track, line.aided, line.snap)
     return [
         NavigatorState(
             time=float(time[k]),

@@ -22,6 +22,7 @@ the velocity at the epoch before that and there; and what the engine writes of i
 FIX = (kinds.GNSS_POSITION, kinds.GNSS_VELOCITY)
 AIDING = (kinds.GNSS_POSITION, kinds.WHEEL_SPEED, kinds.ODOMETER)
 """kinds without which a run coasts"""
+_AIDS = np.isin(np.arange(len(kinds.KINDS)), AIDING)
 
 
 def rows_of(inputs: Inputs, outputs: Outputs, shown: slice, last: int) -> Array:
@@ -35,10 +36,9 @@ def rows_of(inputs: Inputs, outputs: Outputs, shown: slice, last: int) -> Array:
     return np.column_stack([*columns, velocity[at - 1], velocity[at], outputs.innovations[shown][kept]])
 
 
-def aided_at(rows: Array) -> Array:
-    """Return when a position or a speed was accepted, s."""
-    taken = np.isin(rows[:, KIND], AIDING) & np.isin(rows[:, STATUS], (update.ACCEPTED, update.RESET))
-    return np.asarray(rows[taken, TIME])
+def aided_at(kind: NDArray[np.int8], status: NDArray[np.int8], time: Array) -> Array:
+    """Return when a position or a speed was accepted, s, of the kinds, what was made of them, and times of events."""
+    return np.asarray(time[_AIDS[kind] & ((status == update.ACCEPTED) | (status == update.RESET))])
 
 
 def speed_wheels(choice: Choice, rig: Rig) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.model.findings import Finding
+from polyins.model.methods import Method
 from polyins.model.recording import Recording
 from polyins.model.solution import Innovations
 from polyins.navigate import batch, outcome
@@ -48,8 +49,8 @@ class Part:
         self.time.append(time)
         self.missing.append(missing)
 
-    def findings(self, choice: Choice, recording: Recording) -> list[Finding]:
-        """Return gaps, disagreements, and what became of IMUs that fell silent."""
+    def findings(self, row: Method, choice: Choice, recording: Recording, fixes: bool) -> list[Finding]:
+        """Return gaps, disagreements, and what became of IMUs that fell silent; `fixes`: whether there is GNSS."""
         found = []
         if self.time:
             time, missing = np.array([*self.time, self.last]), np.array([*self.missing, self.missing[-1]])
@@ -57,7 +58,7 @@ class Part:
                 gaps = [(float(time[max(k - 1, 0)]), float(time[end - 1])) for k, end in batch.stretches(missing[:, i])]
                 found += [gap_finding(imu.name, gaps)] if gaps else []
             if recording.rig.has_wheels:
-                found += batch.silences(choice, recording, Aligned(time, np.empty(0), (), missing))
+                found += batch.silences(row, choice, recording, Aligned(time, np.empty(0), (), missing), fixes)
         return [*found, *self.windows.disagreements(recording.rig)]
 
 

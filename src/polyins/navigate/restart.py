@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
-from polyins.model.findings import Finding
+from polyins.model.findings import Finding, Severity
 from polyins.model.recording import GnssStream, ImuStream, Recording, StartOptions
 from polyins.model.rig import Imu, ImuErrors
 from polyins.model.solution import Solution
+from polyins.navigate.bridging import TURN_RATE
 from polyins.prepare.alignment import Start
 
 Array = NDArray[np.float64]
@@ -35,6 +36,8 @@ USUAL_SPEED = 10.0
 """m/s, at least, that a vehicle may drive in a pause"""
 CLIMBED = 0.1
 """of the way: height that a vehicle gains or loses on it"""
+SMALL_TURN = 5.0
+"""deg: more is ten times what a heading by dead reckoning is usually sure to"""
 UNKNOWN = "unknown: that before the pause"
 ANY_HEADING = np.pi / np.sqrt(3.0)
 """rad: std of a heading of which nothing is known"""
@@ -128,6 +131,18 @@ def restarted(pause: tuple[float, float], start: Mapping[str, object]) -> Findin
         return Finding("restart", text, from_s=pause[0], to_s=begins, size=size)
     remedy = "GNSS tells place and heading again; start.time_s begins a run of its own after the pause"
     return Finding("restart", text, "serious", from_s=pause[0], to_s=begins, size=size, remedy=remedy)
+
+
+def coasted(gaps: list[tuple[float, float]]) -> tuple[Finding, ...]:
+    """Say that a vehicle without GNSS coasted, s to s, whose blocks take each other's common error for news."""
+    found = []
+    for gap in gaps:
+        turned = np.degrees(TURN_RATE * (gap[1] - gap[0]))
+        text = f"{_words(gap)}; the vehicle may have turned by {turned:.0f} deg (1 sigma), which the std do not hold"
+        severity: Severity = "serious" if turned > SMALL_TURN else "doubt"
+        remedy = "a method of one block, as body-ins, or /centralized holds it; GNSS tells it"
+        found.append(Finding("pause", text, severity, from_s=gap[0], to_s=gap[1], size=turned, remedy=remedy))
+    return tuple(found)
 
 
 def _words(pause: tuple[float, float]) -> str:

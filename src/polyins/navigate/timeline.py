@@ -113,8 +113,11 @@ class Timeline:
     @property
     def aided(self) -> Array:
         """When positions or speeds were accepted, s: of the window, and the latest before it, or the start."""
-        rows = outcome.rows_of(self.inputs, self.outputs, slice(0, self.events), self.last)
-        return np.concatenate([self.run.aided, outcome.aided_at(rows)])
+        return np.concatenate([self.run.aided, self._aided(self.events)])
+
+    def _aided(self, used: int) -> Array:
+        kind, status = self.inputs.event_kind[:used], self.outputs.event_status[:used]
+        return outcome.aided_at(kind, status, self.inputs.event_time[:used])
 
     def has_event(self, kind: int, time: float) -> bool:
         """Whether there is an event of that kind and time in the window."""
@@ -199,7 +202,7 @@ class Timeline:
         """Keep what became of the first events of the window."""
         rows = outcome.rows_of(self.inputs, self.outputs, slice(0, used), self.last)
         self._measured.frombytes(np.ascontiguousarray(rows).tobytes())
-        aided = np.concatenate([self.run.aided, outcome.aided_at(rows)])
+        aided = np.concatenate([self.run.aided, self._aided(used)])
         self.run.aided[:] = [float(time) for time in aided[-USUAL_AIDING:]]
 
     def _by_epoch(self) -> list[NDArray[Any]]:

@@ -52,6 +52,10 @@ def mean_radius(rig: Rig, speed: Sequence[Sequence[int]]) -> float:
     return float(np.mean([np.mean([one.radius for one in module if one]) for module in wheels])) if wheels else 0.0
 
 
+LONGEST = 0.2
+"""s: an epoch that is longer ends a pause"""
+
+
 class Schedule:
     """When a bank measures by itself: its wheels' speed, standstills, where its blocks are to each other, no slip.
 
@@ -82,8 +86,8 @@ class Schedule:
 
     def events(self, time: Array, intervals: Array, lateral: Array) -> Scheduled:
         """Return what is due in further epochs: stamps, s, their intervals, and the place of the speed there, (T,)."""
-        # an event is at the epoch that is nearest to its time
-        reach = np.maximum.accumulate(time + 0.5 * intervals)
+        # an event is at the epoch that is nearest to its time; how long a pause was says nothing of the next epoch
+        reach = np.maximum.accumulate(time + 0.5 * np.minimum(intervals, LONGEST))
         found = self._speeds(time, reach, lateral) if self._wheels else []
         if self._several:
             found += self._points(time, reach)
@@ -115,14 +119,16 @@ class Schedule:
 
     def _points(self, time: Array, reach: Array) -> Scheduled:
         found: Scheduled = []
-        while (k := int(np.searchsorted(reach, self._last_point + self._options.constraint_interval))) < len(time):
+        k, every = -1, self._options.constraint_interval
+        while (k := max(k + 1, int(np.searchsorted(reach, self._last_point + every)))) < len(time):
             found.append((k, kinds.REFERENCE_POINT, 0.0))
             self._last_point = float(time[k])
         return found
 
     def _no_slips(self, time: Array, reach: Array, interval: float) -> Scheduled:
         found: Scheduled = []
-        while (k := int(np.searchsorted(reach, self._last_assumed + interval))) < len(time):
+        k = -1
+        while (k := max(k + 1, int(np.searchsorted(reach, self._last_assumed + interval)))) < len(time):
             found.append((k, kinds.ODOMETER, 0.0))
             self._last_assumed = float(time[k])
         return found
@@ -130,7 +136,8 @@ class Schedule:
     def _rests(self, time: Array, reach: Array, interval: float) -> Scheduled:
         """Judge one window after the other; each begins where the one before ends."""
         found: Scheduled = []
-        while (k := int(np.searchsorted(reach, self._last_speed + interval))) < len(time):
+        k = -1
+        while (k := max(k + 1, int(np.searchsorted(reach, self._last_speed + interval)))) < len(time):
             if self._open:
                 found += [(k, kinds.ZERO_RATE, 0.0), (k, kinds.ZERO_VELOCITY, 0.0)]
             found.append((k, kinds.WINDOW, 0.0))

@@ -102,7 +102,7 @@ def _parts(
     start, end = _extent(recording, row)
     stretches = recording.stretches(start.time, end, stretch_s)
     run: batch.Prepared | None = None
-    silent = _Silences(recording.head, choice)
+    silent = _Silences(row, choice, recording.head)
     votes = of_data(recording.head, recording.beginning(), recording.span[1])
     for stretch in _whole_logs(stretches):
         silent.add(stretch)
@@ -138,8 +138,8 @@ def _laid_out(row: Method, choice: Choice, recording: LongRecording, first: Alig
 class _Silences:
     """The epochs in which IMUs have no data, and their neighbours, from which it is told what became of them."""
 
-    def __init__(self, recording: Recording, choice: Choice) -> None:
-        self._recording, self._choice = recording, choice
+    def __init__(self, row: Method, choice: Choice, recording: Recording) -> None:
+        self._row, self._choice, self._recording = row, choice, recording
         self._seen: list[Aligned] = []
 
     def add(self, stretch: Aligned) -> None:
@@ -153,7 +153,8 @@ class _Silences:
             return ()
         time, first = np.unique(np.concatenate([part.time for part in self._seen]), return_index=True)
         missing = np.concatenate([part.missing for part in self._seen])[first]
-        return batch.silences(self._choice, self._recording, Aligned(time, np.empty(0), (), missing))
+        aligned, fixes = Aligned(time, np.empty(0), (), missing), self._recording.gnss is not None
+        return batch.silences(self._row, self._choice, self._recording, aligned, fixes)
 
 
 def _whole_logs(stretches: Iterator[Aligned]) -> Iterator[Aligned]:
