@@ -686,7 +686,8 @@ def find_standstill(
     edges = aligned.time[np.minimum(np.arange(count + 1) * tenths * tenth, len(aligned.time) - 1)]
     if fixes is not None and fixes.velocity is not None:
         speed = np.linalg.norm(usual_velocity(fixes), axis=1)
-        moving = fixes.time[speed > np.maximum(0.3, 4.0 * _speed_noise(fixes))]
+        noise = 4.0 * fixes.position_std.max(axis=1)
+        moving = fixes.time[speed > np.maximum(0.3, noise)]
         for t in moving:
             still[(edges[:-1] - 1.0 < t) & (t < edges[1:] + 1.0)] = False
     runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
@@ -699,15 +700,6 @@ def find_standstill(
         ):
             return float(edges[begin]), until
     return None
-
-
-def _speed_noise(fixes: GnssStream) -> Array:
-    """Return the std of the speed that fixes give, m/s, shape (M,), of differences where the receiver gives none."""
-    if fixes.velocity_std is not None:
-        return np.asarray(np.linalg.norm(fixes.velocity_std, axis=1))
-    steps = np.diff(fixes.time)
-    over = np.concatenate([steps[:1], steps[1:] + steps[:-1], steps[-1:]])
-    return np.asarray(np.linalg.norm(fixes.position_std, axis=1) * np.sqrt(2.0) / over)
 
 
 def feels_gravity(aligned: Aligned, begin: float, end: float, bias: float) -> bool:
