@@ -59,7 +59,10 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
         "polyins": {"simulated": table(outcomes)},
         "settings": {
             "cases": count,
-            "numbers": "odd; thresholds were set on even ones",
+            "numbers": (
+                "odd; thresholds were set on even ones, but the std of a start in motion was widened, and a looser"
+                " limit of rest taken back, after odd ones had been seen"
+            ),
             "inside": f"at the start within {INSIDE:g} std; throughout: at every epoch of 20 s as well",
             "wrong": "heading more than 10 deg off where its std is under 3 deg",
         },
