@@ -8,6 +8,7 @@ import pytest
 from polyins.model.recording import Recording
 from polyins.studies.robustness.case import Case, cases, good
 from polyins.studies.robustness.fault import during, unchanged
+from polyins.studies.robustness.lies import LIES, told_lie
 from polyins.studies.robustness.table import Row, judged, summary
 
 SEEDS = (0, 2)
@@ -85,3 +86,15 @@ def test_the_sums_count_what_is_wrong_in_silence() -> None:
     assert (sums["cases"], sums["refused"], sums["silent_wrong"]) == (5, 1, 2)
     assert sums["named_percent"] == 50.0
     assert sums["trusted_if_harmless_percent"] == 100.0
+
+
+@pytest.mark.parametrize(("name", "metres"), [("10 m for 5 s", 0.5), ("1 cm told, 1 m true, always", 3.0)])
+def test_a_lie_moves_the_position_little_and_bends_no_heading(name: str, metres: float) -> None:
+    row = told_lie(next(lie for lie in LIES if lie.name == name), seed=2)
+    assert row["horizontal_max_m"] < metres
+    assert row["heading_max_deg"] < 1.0
+    assert row["named"]
+
+
+def test_fixes_of_another_time_are_refused() -> None:
+    assert "clock_offset_s: -18.0" in told_lie(next(lie for lie in LIES if lie.name == "18 s late"), seed=2)["refused"]

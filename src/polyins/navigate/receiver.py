@@ -31,7 +31,7 @@ LONGEST = 5.0
 """s between two fixes from which noise is told"""
 SAME = 0.5
 """part of the innovation that began a series by which a later one may differ and be of it"""
-SMALL, SMALL_LASTS, LASTS = 20.0, 10.0, 15.5
+SMALL, SMALL_LASTS, LASTS = 20.0, 10.0, 14.95
 """A series of offsets up to that many metres is believed after so many s, one of larger ones after so many."""
 
 CHANGES, COUNT, AFTER, SPREAD, KNOWN, LAST = 0, 33, 34, 37, 40, 41

@@ -34,6 +34,12 @@ TARGETS = (
         seconds=(12, 120),
     ),
     Target(
+        "lies",
+        "polyins.studies.robustness.lies:reproduce",
+        seconds=(10, 30),
+        print_tables="polyins.studies.robustness.lies:print_tables",
+    ),
+    Target(
         "robustness",
         "polyins.studies.robustness.table:reproduce",
         seconds=(50, 240),
