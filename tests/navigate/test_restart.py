@@ -74,7 +74,7 @@ def navigator(recording: Recording) -> Navigator:
 def test_live_a_pause_is_what_it_is_in_a_batch_run(drive: Recording, length: float) -> None:
     recording = paused(drive, 60.0, 60.0 + length)
     one, whole = navigator(recording), batch.run(recording, "enav-fusion")
-    states = play(one, recording, until(recording, 130.0))
+    states = play(one, recording, until(recording, 140.0))
     time = np.array(list(states))
     place = np.searchsorted(whole.time, time)
     np.testing.assert_array_equal(whole.time[place], time)

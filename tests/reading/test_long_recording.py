@@ -69,8 +69,8 @@ def stretched(config: Path, folder: Path, method: str, stretch_s: float) -> dict
     return navigation.run(opened(config), method, folders={folder: None}, stretch_s=stretch_s).summary
 
 
-def agree(config: Path, folder: Path, method: str, stretch_s: float = 13.7) -> None:
-    """Compare a run in stretches with one in memory: the files bit for bit, the figures but for rounding."""
+def agree(config: Path, folder: Path, method: str, stretch_s: float = 13.7) -> pi.Solution:
+    """Compare a run in stretches with one in memory, which is returned: files bit for bit, figures but for rounding."""
     recording = pi.load(config)
     solution = pi.run(recording, method)
     write_solution(solution, folder / "whole")
@@ -80,6 +80,12 @@ def agree(config: Path, folder: Path, method: str, stretch_s: float = 13.7) -> N
     for key in document.keys() - set(TIMES):
         assert json.dumps(rounded(document[key])) == json.dumps(rounded(expected[key])), key
     assert read_solution(folder / "parts").method == method
+    return solution
+
+
+def restarts(solution: pi.Solution) -> list[str]:
+    """Return what became of the pauses, in turn."""
+    return [found.kind for found in solution.findings if found.kind in ("restart", "pause")]
 
 
 @pytest.mark.parametrize("method", ["enav-fusion", "single"])
@@ -135,6 +141,30 @@ def driven() -> Recording:
 def test_wheels_are_taken_in_stretches(driven, method, tmp_path):
     config = files.write(driven, tmp_path / "recording")
     agree(config, tmp_path, method)
+
+
+def paused(recording: Recording, *pauses: tuple[float, float]) -> Recording:
+    streams = []
+    for stream in recording.imus:
+        kept = np.all([(stream.time <= begin) | (stream.time >= end) for begin, end in pauses], axis=0)
+        streams.append(ImuStream(stream.name, stream.time[kept], stream.dtheta[kept], stream.dvel[kept]))
+    return replace(recording, imus=tuple(streams))
+
+
+@pytest.mark.parametrize("gnss", [False, True])
+def test_wheels_that_pause_begin_anew_in_stretches(gnss, tmp_path):
+    """After the first pause there is no standstill to begin anew at."""
+    recording = paused(driven_vehicle.drive(gnss=gnss), (30.0, 34.0), (60.0, 64.5))
+    config = files.write(recording, tmp_path / "recording")
+    assert restarts(agree(config, tmp_path, "triple-ins", 9.3)) == ["pause", "restart"]
+
+
+@pytest.mark.parametrize("method", ["enav-fusion", "single"])
+def test_arrays_that_pause_begin_anew_in_stretches(simulated, method, tmp_path):
+    """The last part is too short for a start."""
+    recording = unsynchronised(paused(simulated, (85.0, 97.0), (145.0, 148.5)))
+    config = files.write(recording, tmp_path / "recording")
+    assert restarts(agree(config, tmp_path, method)) == ["restart", "pause"]
 
 
 def test_an_array_at_rest_is_taken_in_stretches(simulated, tmp_path):

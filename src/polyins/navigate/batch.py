@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -115,15 +115,19 @@ def run(
     data that give no start.
     """
     taken = choose(find_method(method), recording.rig, imu).all
-    pauses = restart.pauses(recording.subset(taken))
+    of_them = recording.subset(taken)
+    pauses = restart.pauses(of_them)
     if not pauses:
         return navigate(prepare(recording, method, imu=imu), progress)
 
-    def of_part(part: Recording, before: restart.Known | None) -> tuple[Solution, restart.Known]:
-        prepared = prepare(part, method, imu=imu, before=before)
-        return navigate(prepared, progress), known(prepared, -1)
+    def of_part(
+        part: Recording, before: restart.Known | None, pause: restart.Pause | None
+    ) -> Iterator[tuple[Solution, restart.Known]]:
+        prepared = prepare(restart.begun(part, before, pause), method, imu=imu, before=before)
+        yield navigate(prepared, progress), known(prepared, -1)
 
-    return restart.run_parts(recording, pauses, of_part)
+    whole = Solution.joined(list(restart.run_parts(restart.parts_of(recording, pauses), of_part)))
+    return replace(whole, recording_span=_span(of_them))
 
 
 def known(run: Prepared, last: int) -> restart.Known:
@@ -194,9 +198,7 @@ def prepare(
     aligned = timesync.align(recording.imus, bridge=not recording.rig.has_wheels)
     of_them = of_data(recording, aligned, float(aligned.time[-1]))
     aligned = replace(aligned, findings=(*aligned.findings, *of_them))
-    start = start_of(row, recording, aligned)
-    if before is not None and restart.is_lost(recording):
-        start = restart.as_lost(start, before)
+    start = start_of(row, recording, aligned, before)
     end = aligned.time[-1] if recording.start.end_time is None else recording.start.end_time
     aligned = aligned.between(start.time, end)
     if len(aligned.time) < 2:
@@ -214,9 +216,10 @@ def find_start(recording: Recording, method: str = "enav-fusion", *, imu: int = 
     return start_of(row, taken, timesync.align(taken.imus, bridge=not taken.rig.has_wheels))
 
 
-def start_of(row: Method, recording: Recording, aligned: Aligned) -> Start:
-    """Find the start of a method over a recording whose IMUs are on one time base."""
-    return search.find(recording, aligned, lambda blind: run(blind, row.name))
+def start_of(row: Method, recording: Recording, aligned: Aligned, before: restart.Known | None = None) -> Start:
+    """Find the start of a method over a recording whose IMUs are on one time base; `before`: see `prepare`."""
+    start = search.find(recording, aligned, lambda blind: run(blind, row.name))
+    return restart.as_lost(start, before) if before is not None and restart.is_lost(recording) else start
 
 
 def lay_out(

@@ -8,10 +8,10 @@ heading again: the old ones stand, as unsure as what a vehicle can drive and tur
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ from polyins.navigate.bridging import TURN_RATE
 from polyins.prepare.alignment import Start
 
 Array = NDArray[np.float64]
+Part = TypeVar("Part")
+Pause = tuple[float, float]
+"""the last stamp before it and the first after, s"""
 
 HOPELESS, HOPELESS_ON_WHEELS, HOPELESS_BLIND = 1.0, 0.6, 3.0
 """s without data of any IMU, after which the state is found anew: of an array; of wheels with GNSS, which coast; and
@@ -71,58 +74,80 @@ def hopeless(on_wheels: bool, fixes: bool) -> float:
 def pauses(recording: Recording) -> list[tuple[float, float]]:
     """Return where no IMU has data for hopelessly long: the last stamp before and the first after, s."""
     limit = hopeless(recording.rig.has_wheels, recording.gnss is not None)
-    common = [(-np.inf, np.inf)]
+    gaps = []
     for stream in recording.imus:
         edges = np.concatenate([[-np.inf], stream.time, [np.inf]])
-        wide = np.flatnonzero(np.diff(edges) > limit)
-        both = [(max(a, edges[k]), min(b, edges[k + 1])) for a, b in common for k in wide]
+        gaps.append([(edges[k], edges[k + 1]) for k in np.flatnonzero(np.diff(edges) > limit)])
+    return common_pauses(gaps, limit)
+
+
+def common_pauses(gaps: Iterable[Iterable[Pause]], limit: float) -> list[Pause]:
+    """Return where all IMUs have a gap longer than a limit, s, within what they measure; `gaps` of each IMU."""
+    common = [(-np.inf, np.inf)]
+    for known in map(list, gaps):
+        both = [(max(a, begin), min(b, end)) for a, b in common for begin, end in known]
         common = [(begin, end) for begin, end in both if end - begin > limit]
     return [(float(begin), float(end)) for begin, end in common if np.isfinite(end - begin)]
 
 
+def parts_of(recording: Recording, found: Sequence[Pause]) -> Iterator[tuple[Pause | None, Recording]]:
+    """Give the parts of a recording between its pauses, each with the one before it."""
+    for pause, begin, end in borders(found):
+        yield pause, part_of(recording, begin, end, pause)
+
+
+def borders(found: Sequence[Pause]) -> list[tuple[Pause | None, float, float]]:
+    """Return the pause before each part, the time after which its data begin, and that up to which they go, s."""
+    lasts = [-np.inf, *(last for last, _ in found), np.inf]
+    return [(found[k - 1] if k else None, begin, end) for k, (begin, end) in enumerate(pairwise(lasts))]
+
+
 def run_parts(
-    recording: Recording,
-    found: list[tuple[float, float]],
-    run: Callable[[Recording, Known | None], tuple[Solution, Known]],
-) -> Solution:
+    parts: Iterable[tuple[Pause | None, Part]],
+    run: Callable[[Part, Known | None, Pause | None], Iterator[tuple[Solution, Known]]],
+) -> Iterator[Solution]:
     """Run a recording part by part between its pauses; a part that gives no start is left out, with a finding.
 
-    `run` takes a part, and what the run before it knew. Raises InputError if no part gives a start.
+    `parts`: each with the pause before it. `run` takes a part, what the run before it knew, and the pause, and gives
+    the solution stretch by stretch, with what is known at its end. What is told of the whole, the last solution tells.
+    Raises InputError if no part gives a start.
     """
-    borders = [-np.inf, *(last for last, _ in found), np.inf]
     before: Known | None = None
-    parts: list[Solution] = []
-    findings: list[Finding] = []
+    held: Solution | None = None
+    told: tuple[Finding, ...] = ()
+    first: dict[str, object] = {}
     refusal: InputError | None = None
-    for k, (begin, end) in enumerate(pairwise(borders)):
-        pause = found[k - 1] if k else None
-        part = _part(recording, begin, end, pause)
+    for pause, part in parts:
+        begun = False
         try:
-            _check_data(part)
-            solution, knowing = run(part if pause is None else after(part, before, is_lost(part)), before)
+            for solution, knowing in run(part, before, pause):
+                if held is not None:
+                    yield held
+                if not begun and pause is not None:
+                    told = (*told, restarted(pause, solution.start))
+                begun, before, first = True, knowing, first or solution.start
+                found = (*told, *(one for one in solution.findings if one not in told))
+                held = replace(solution, start=first, findings=found)
         except InputError as error:
+            if begun:
+                raise
             refusal = refusal or error
-            findings += [] if pause is None else [left_out(pause, str(error))]
-            continue
-        if pause is not None:
-            findings.append(restarted(pause, solution.start))
-        findings += [one for one in solution.findings if one not in findings]
-        parts.append(solution)
-        before = knowing
-    if not parts:
+            told = told if pause is None else (*told, left_out(pause, str(error)))
+        else:
+            told = told if held is None else held.findings
+    if held is None:
         assert refusal is not None
         raise refusal
-    whole = Solution.joined(parts)
-    return replace(whole, start=parts[0].start, findings=tuple(findings), recording_span=_span(recording))
+    yield replace(held, findings=told)
 
 
-def left_out(pause: tuple[float, float], why: str) -> Finding:
+def left_out(pause: Pause, why: str) -> Finding:
     """Say that what follows a pause gives no start."""
     text = f"{_words(pause)}; what follows is left out: {why}"
     return Finding("pause", text, from_s=pause[0], to_s=pause[1], size=pause[1] - pause[0])
 
 
-def restarted(pause: tuple[float, float], start: Mapping[str, object]) -> Finding:
+def restarted(pause: Pause, start: Mapping[str, object]) -> Finding:
     """Say that the state was found anew after a pause; `start`: its time and where it came from, as of a solution."""
     heading, begins = start.get("heading"), cast(float, start["time_s"])
     text = f"{_words(pause)}; the state was found anew at {begins:.2f} s (heading: {heading})"
@@ -145,13 +170,23 @@ def coasted(gaps: list[tuple[float, float]]) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-def _words(pause: tuple[float, float]) -> str:
+def _words(pause: Pause) -> str:
     return f"no IMU has data for {pause[1] - pause[0]:.1f} s from {pause[0]:.2f} s"
 
 
 def is_lost(recording: Recording) -> bool:
     """Whether nothing in a recording tells place and heading after a pause."""
     return recording.rig.has_wheels and recording.gnss is None and recording.start.heading_from != "reference"
+
+
+def begun(part: Recording, before: Known | None, pause: Pause | None) -> Recording:
+    """Return a part with what is known before it; raise InputError if it lacks what a start is made from."""
+    lacking = [stream.name for stream in part.imus if stream.time.size < 2]
+    if lacking and (part.rig.has_wheels or len(lacking) == len(part.imus)):
+        raise InputError(f"no data from {lacking[0]}")
+    if part.gnss is not None and not part.gnss.time.size:
+        raise InputError("no fix from GNSS")
+    return part if pause is None else after(part, before, is_lost(part))
 
 
 def after(recording: Recording, before: Known | None, lost: bool) -> Recording:
@@ -188,12 +223,7 @@ def as_lost(start: Start, before: Known) -> Start:
     )
 
 
-def _span(recording: Recording) -> tuple[float, float]:
-    stamps = [stream.time[[0, -1]] for stream in recording.imus if stream.time.size]
-    return float(np.min(stamps)), float(np.max(stamps))
-
-
-def _part(recording: Recording, begin: float, end: float, pause: tuple[float, float] | None) -> Recording:
+def part_of(recording: Recording, begin: float, end: float, pause: Pause | None) -> Recording:
     """Return the recording with the data after one time and up to another, s; `pause`: that before it."""
     streams = []
     for stream in recording.imus:
@@ -203,14 +233,6 @@ def _part(recording: Recording, begin: float, end: float, pause: tuple[float, fl
     if gnss is not None and pause is not None:
         gnss = _fixes(gnss, gnss.time >= pause[1])
     return replace(recording, imus=tuple(streams), gnss=gnss)
-
-
-def _check_data(part: Recording) -> None:
-    for stream in part.imus:
-        if stream.time.size < 2:
-            raise InputError(f"no data from {stream.name}")
-    if part.gnss is not None and not part.gnss.time.size:
-        raise InputError("no fix from GNSS")
 
 
 def _fixes(gnss: GnssStream, kept: NDArray[np.bool_]) -> GnssStream:

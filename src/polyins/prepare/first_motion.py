@@ -172,7 +172,8 @@ class Beginning:
         part = self.aligned.between(begin, begin + LONGEST + 1.0)
         known = self.errors.mean(axis=0)[:6]
         steps = part.increments[1:][:, :, self.bodies].mean(axis=2) - known * np.diff(part.time)[:, None]
-        together = max(1, round(STEP * self.aligned.rate_hz))
+        # usual rates lie far from where the number changes: live it is that of a whole recording
+        together = max(1, int(STEP * self.aligned.rate_hz + 0.3))
         count = len(steps) // together
         sums = steps[: count * together].reshape(count, together, 6).sum(axis=1)
         imus = [self.recording.rig.imus[i] for i in self.bodies]

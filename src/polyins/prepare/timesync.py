@@ -95,7 +95,7 @@ def align(streams: tuple[ImuStream, ...], bridge: bool = True, whole: Whole | No
     """
     if whole is None:
         whole = Whole.of(streams)
-        _check_common(whole, streams, wait=not bridge)
+        check_common([stream.name for stream in streams], whole, wait=not bridge)
     gaps_by_stream = [gaps_of(*of) for of in zip((stream.time for stream in streams), whole.intervals, strict=True)]
     time = _common_time(streams, whole, wait=not bridge)
     on_base: list[tuple[Array, Array]] = []
@@ -179,10 +179,12 @@ def least_common(begins: Array, ends: Array, *, wait: bool) -> float:
     return float(together.max(axis=1).min())
 
 
-def _check_common(whole: Whole, streams: tuple[ImuStream, ...], *, wait: bool) -> None:
+def check_common(names: Sequence[str], whole: Whole, *, wait: bool) -> None:
+    """Raise InputError if streams of those names have less than two seconds in common, see `least_common`."""
     there = np.isfinite(whole.begins)
     if least_common(whole.begins[there], whole.ends[there], wait=wait) < LEAST_COMMON:
-        spans = ", ".join(f"{s.name} {s.time[0]:.3f} to {s.time[-1]:.3f} s" for s in streams if len(s.time))
+        every = zip(names, whole.begins, whole.ends, strict=True)
+        spans = ", ".join(f"{name} {begin:.3f} to {end:.3f} s" for name, begin, end in every if np.isfinite(begin))
         raise InputError(f"imus: less than two common seconds ({spans}); expected streams that overlap on one clock")
 
 

@@ -149,6 +149,14 @@ class StretchReader:
         self._ahead: Iterator[ImuStream] = file.stretches()
         self._held: ImuStream | None = None
 
+    def skip(self, begin: float) -> None:
+        """Let go what is not after a time, s."""
+        while self._held is None or not self._held.time.size or self._held.time[-1] <= begin:
+            self._held = next(self._ahead, None)
+            if self._held is None:
+                return
+        self._held = _joined(_part(self._held, int(np.searchsorted(self._held.time, begin, "right")), None))
+
     def until(self, end: float, keep_from: float) -> ImuStream:
         """Return what is held, up to the first stamp after `end` at least, then let go what is before `keep_from`."""
         while self._held is None or not self._held.time.size or self._held.time[-1] <= end:

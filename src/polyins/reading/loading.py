@@ -101,7 +101,7 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     alone = len(config.imus) == 1
     found = [read_imu(entry, index, document, alone=alone) for index, entry in enumerate(config.imus)]
     alive, dead = faults.alive([one.stream for one in found])
-    notes += _one_by_kind([text for i in alive for text in found[i].check()])
+    notes += one_by_kind([text for i in alive for text in found[i].check()])
     measuring = [found[i] for i in alive]
     faults.check_distinct([one.stream for one in measuring])
     kept, fallen = usable.upright([one.entry for one in measuring], alive, [one.stream for one in measuring], document)
@@ -229,7 +229,7 @@ def in_force(config: Config, offsets: tuple[Offset, ...] = ()) -> str:
     return write_yaml(known.model_dump(mode="json", exclude=NOT_IN_FORCE))
 
 
-def _one_by_kind(notes: list[str]) -> list[str]:
+def one_by_kind(notes: list[str]) -> list[str]:
     """Say only once what several files have in common, word for word but for their names."""
     places: dict[str, list[str]] = {}
     for note in notes:

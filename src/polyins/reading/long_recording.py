@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from polyins.files import find_named
 from polyins.formats.columns import is_parquet
 from polyins.formats.rows import ImuRows
 from polyins.model.findings import Finding
-from polyins.model.recording import ImuStream, Recording
-from polyins.navigate.restart import hopeless
+from polyins.model.recording import ImuStream, Recording, usual_interval
+from polyins.navigate.restart import Pause, borders, common_pauses, hopeless, part_of
 from polyins.prepare import timesync
 from polyins.prepare.timesync import Aligned, Whole
 from polyins.reading import loading, usable
@@ -56,6 +57,8 @@ class LongRecording:
     extents: tuple[StreamExtent, ...]
     span: tuple[float, float]
     """that all IMUs cover, s"""
+    within: tuple[float, float] = (-np.inf, np.inf)
+    """s: what is later than the first and not than the second belongs to it"""
 
     @property
     def rows(self) -> int:
@@ -73,12 +76,39 @@ class LongRecording:
     def _later_gaps(self, of: StreamExtent) -> list[tuple[float, float]]:
         begin, end = self.span
         known = [gap for gap in of.gaps if gap[1] > begin and gap[0] < end]
-        return known + ([(of.last, end)] if end - of.last > timesync.LATE else [])
+        return known + ([(max(of.last, begin), end)] if end - of.last > timesync.LATE else [])
 
     def subset(self, indices: Sequence[int]) -> LongRecording:
         """Return the recording with just the IMUs of those indices."""
         files, extents = tuple(self.files[i] for i in indices), tuple(self.extents[i] for i in indices)
         return replace(self, head=self.head.subset(indices), files=files, extents=extents, span=_span(files, extents))
+
+    def pauses(self) -> list[Pause]:
+        """Return where no IMU has data for hopelessly long, see `restart`."""
+        edges = [[(-np.inf, one.first), *one.gaps, (one.last, np.inf)] for one in self.extents]
+        return common_pauses(edges, hopeless(self.head.rig.has_wheels, self.head.gnss is not None))
+
+    def parts(self, found: Sequence[Pause]) -> Iterator[tuple[Pause | None, LongRecording]]:
+        """Give the parts between pauses, each with the one before it."""
+        for pause, begin, end in borders(found):
+            streams = self.head.imus if pause is None else tuple(self._beginning_after(begin, pause[1]))
+            head = part_of(replace(self.head, imus=streams), begin, end, pause)
+            extents = tuple(map(partial(_extent_within, begin, end), self.extents, head.imus))
+            there = [one for one in extents if one.first <= one.last]
+            span = _common(there, wait=not self._bridge) if there else (begin, end)
+            yield pause, replace(self, head=head, extents=extents, span=span, within=(begin, end))
+
+    def check(self) -> None:
+        """Raise InputError if the IMUs have less than two seconds in common."""
+        timesync.check_common([file.entry.name for file in self.files], self._whole, wait=not self._bridge)
+
+    def _beginning_after(self, begin: float, first: float) -> Iterator[ImuStream]:
+        """Give the streams of the IMUs from a time on for as long as a start takes, s."""
+        rate = sum(1.0 / extent.interval for extent in self.extents)
+        for file in self.files:
+            reader = StretchReader(file)
+            reader.skip(begin)
+            yield reader.until(first + max(HEAD_S, HEAD_ROWS / rate), begin)
 
     def beginning(self) -> Aligned:
         """Return the beginning of the IMUs on one time base."""
@@ -87,11 +117,15 @@ class LongRecording:
     def stretches(self, begin: float, end: float, stretch_s: float = STRETCH_S) -> Iterator[Aligned]:
         """Give the epochs from begin to end, s, aligned stretch by stretch."""
         readers = [StretchReader(file) for file in self.files]
+        for reader in readers:
+            reader.skip(self.within[0])
         before = -np.inf
         for border in self._borders(end, stretch_s):
             if begin < border < min(begin + LEAST_FIRST_S, end):
                 continue
-            streams = tuple(reader.until(border + MARGIN_S, border - MARGIN_S) for reader in readers)
+            streams = tuple(
+                reader.until(min(border + MARGIN_S, self.within[1]), border - MARGIN_S) for reader in readers
+            )
             if border > begin:
                 aligned = timesync.align(streams, self._bridge, self._whole)
                 yield aligned.between(max(np.nextafter(before, np.inf), begin), border)
@@ -154,17 +188,14 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
     config, files, extents = _of_imus(kept, config, files, extents)
     places = [alive[i] for i in kept]
     span = _span(files, extents)
-    wheels = any(entry.wheel is not None for entry in config.imus)
-    if _pauses(extents, hopeless(wheels, config.gnss is not None)):
-        return None  # each part is a run of its own
     until = _head_end(config, document, extents, span)
     streams = tuple(StretchReader(file).until(until, span[0]) for file in files)
     beginnings = [
         StretchReader(file).until(max(until, extent.first + CHECKED_S), extent.first)
         for file, extent in zip(files, extents, strict=True)
     ]
-    for file, beginning in zip(files, beginnings, strict=True):
-        notes += _checked(file, beginning)
+    checked = [text for both in zip(files, beginnings, strict=True) for text in _checked(*both)]
+    notes += loading.one_by_kind(checked)
     faults.check_distinct(streams)
     findings = (*dead, *apart, *(finding for extent in extents for finding in extent.findings))
     kept, fallen = usable.upright(config.imus, places, beginnings, document)
@@ -186,13 +217,20 @@ def _of_imus(
     return kept, tuple(files[i] for i in indices), tuple(extents[i] for i in indices)
 
 
-def _pauses(extents: Sequence[StreamExtent], longest: float) -> bool:
-    """Whether there is a time without data of any IMU after which the state is found anew."""
-    first = [gap for gap in extents[0].gaps if gap[1] - gap[0] > longest]
-    others = [extent.gaps for extent in extents[1:]]
-    return any(
-        all(any(min(end, b) - max(begin, a) > longest for a, b in gaps) for gaps in others) for begin, end in first
-    )
+def _extent_within(begin: float, end: float, whole: StreamExtent, beginning: ImuStream) -> StreamExtent:
+    """Return the extent of what lies after a time and up to another, s, of which the beginning is given."""
+    gaps = tuple(gap for gap in whole.gaps if gap[0] > begin and gap[1] <= end)
+    if not beginning.time.size:
+        return replace(whole, first=np.inf, last=-np.inf, gaps=gaps)
+    last = next((gap[0] for gap in whole.gaps if gap[0] <= end < gap[1]), whole.last)
+    interval = usual_interval(beginning.time) if beginning.time.size > 1 else whole.interval
+    return replace(whole, first=float(beginning.time[0]), last=last, gaps=gaps, interval=interval)
+
+
+def _common(extents: Sequence[StreamExtent], *, wait: bool) -> tuple[float, float]:
+    """Return when the IMUs begin and end together, s."""
+    begins, ends = np.array([(one.first, one.last) for one in extents]).T
+    return float(begins.max()) if wait else timesync.common_begin(begins), timesync.common_end(ends)
 
 
 def _head_end(config: Config, document: Document, extents: Sequence[StreamExtent], span: tuple[float, float]) -> float:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from polyins.errors import InputError
 from polyins.evaluation.documents import RunDocument
 from polyins.evaluation.errors import Errors
 from polyins.evaluation.figures import Figures
@@ -22,8 +23,9 @@ from polyins.model.findings import Finding, notes
 from polyins.model.methods import Method, find_method
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
-from polyins.navigate import batch
+from polyins.navigate import batch, restart
 from polyins.navigate.choice import Choice, choose
+from polyins.navigate.restart import Known, Pause
 from polyins.prepare.alignment import Start
 from polyins.prepare.data_findings import of_data
 from polyins.prepare.timesync import Aligned
@@ -99,32 +101,47 @@ def _parts(
         return
     choice = choose(row, recording.head.rig, imu)
     recording, choice = recording.subset(choice.all), choice.renumbered()
-    start, end = _extent(recording, row)
-    stretches = recording.stretches(start.time, end, stretch_s)
+    span = min(one.first for one in recording.extents), max(one.last for one in recording.extents)
+
+    def of_part(part: LongRecording, before: Known | None, pause: Pause | None) -> Iterator[tuple[Solution, Known]]:
+        part = replace(part, head=restart.begun(part.head, before, pause))
+        part.check()
+        for solution, known in _stretched(part, row, choice, stretch_s, before):
+            if progress:
+                progress((known.time - span[0]) / (span[1] - span[0]))
+            yield solution, known
+
+    for part in restart.run_parts(recording.parts(recording.pauses()), of_part):
+        yield replace(part, recording_span=span)
+
+
+def _stretched(
+    recording: LongRecording, row: Method, choice: Choice, stretch_s: float, before: Known | None
+) -> Iterator[tuple[Solution, Known]]:
+    """Navigate one part stretch by stretch; `before`: what was known before it."""
+    start, end = _extent(recording, row, before)
     run: batch.Prepared | None = None
     silent = _Silences(row, choice, recording.head)
     votes = of_data(recording.head, recording.beginning(), recording.span[1])
-    for stretch in _whole_logs(stretches):
+    for stretch in _whole_logs(recording.stretches(start.time, end, stretch_s)):
         silent.add(stretch)
         run = _laid_out(row, choice, recording, stretch, start) if run is None else run.at(stretch)
-        part = batch.navigate(run)
-        if progress:
-            progress(float((stretch.time[-1] - start.time) / (end - start.time)))
-        known = (
+        found = (
             *notes(recording.head.warnings),
             *recording.head.findings,
             *recording.findings,
             *votes,
             *silent.findings(),
         )
-        span = min(one.first for one in recording.extents), max(one.last for one in recording.extents)
-        yield replace(part, findings=known, recording_span=span)
+        yield replace(batch.navigate(run), findings=found), batch.known(run, -1)
+    if run is None:
+        raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")
 
 
-def _extent(recording: LongRecording, row: Method) -> tuple[Start, float]:
+def _extent(recording: LongRecording, row: Method, before: Known | None) -> tuple[Start, float]:
     """Find the start in the beginning; returns the end of the run as well, s."""
     known = recording.head
-    start = batch.start_of(row, known, recording.beginning())
+    start = batch.start_of(row, known, recording.beginning(), before)
     return start, recording.span[1] if known.start.end_time is None else known.start.end_time
 
 
