@@ -569,9 +569,6 @@ class Navigator:
         rig, interval = self._recording.rig, np.array([epoch.time - line.time])
         increments, present = epoch.increments, np.ones(len(rig.imus), dtype=np.uint8)
         if epoch.missing.any():
-            if not epoch.missing.all():
-                for i in np.flatnonzero(epoch.missing):
-                    self._refusals.note_silence(rig.imus[i].name, epoch.time)
             one = Aligned(
                 np.array([line.time, epoch.time]),
                 np.array([epoch.increments, epoch.increments]),

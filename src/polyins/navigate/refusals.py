@@ -15,14 +15,11 @@ from polyins.prepare.plausible import Limits
 Array = NDArray[np.float64]
 
 NOT_FINITE, OUT_OF_RANGE, ZEROS = "not finite", "out of range", "zeros"
-NOTHING = "nothing"
-"""No sample came."""
 
 WHY = {
     NOT_FINITE: "sends what is not a number",
     OUT_OF_RANGE: "shows values beyond the range of any sensor",
     ZEROS: "shows zeros only",
-    NOTHING: "gives no data",
     DUPLICATED: "repeats stamps",
     FUTURE_STAMPED: "has stamps far ahead of the others'",
     LATE: "sends samples too late, or has stamps that go back",
@@ -68,12 +65,6 @@ class Refusals:
         else:
             stretches.append(_Stretch(time, time, 1))
 
-    def note_silence(self, imu: str, time: float) -> None:
-        """Note that an IMU had nothing for an epoch, unless what it sent was refused."""
-        others = (of[-1] for (name, why), of in self._known.items() if name == imu and why != NOTHING)
-        if all(time - last.end > APART for last in others):
-            self.add(imu, NOTHING, time)
-
     def take_over(self, other: Refusals) -> None:
         """Go on with what another one noted before."""
         self._known = other._known
@@ -83,8 +74,7 @@ class Refusals:
         return tuple(
             Finding(
                 LEFT_OUT,
-                f"IMU {imu} {WHY[why]} from {one.begin:.3f} to {one.end:.3f} s; {one.count} "
-                + ("epoch(s) without it" if why == NOTHING else "sample(s) left out"),
+                f"IMU {imu} {WHY[why]} from {one.begin:.3f} to {one.end:.3f} s; {one.count} sample(s) left out",
                 stream=imu,
                 from_s=one.begin,
                 to_s=one.end,

@@ -202,6 +202,9 @@ class Beginning:
         C = one.C_nb
         roll, pitch = np.arctan2(C[2, 1], C[2, 2]), -np.arcsin(np.clip(C[2, 0], -1.0, 1.0))
         swing = C @ np.cross(search.imu.rate - one.x[BG], search.imu.point)
+        # what is told no better than it was known errs as the heading does, which the filter does not know
+        bias_std = AGAIN * one.std(BG)
+        told_bias = bias_std < search.imu.bias_std[:3] / 2.0
         std = AGAIN * one.std(PHI)
         std[:2] = np.maximum(std[:2], LEAST_TILT_STD)
         return FirstMotion(
@@ -211,8 +214,8 @@ class Beginning:
             attitude_std=std,
             velocity=one.x[V] - swing,
             velocity_std=np.maximum(AGAIN * one.std(V), LEAST_VELOCITY_STD),
-            gyro_bias=one.x[BG],
-            gyro_bias_std=AGAIN * one.std(BG),
+            gyro_bias=np.where(told_bias, one.x[BG], 0.0),
+            gyro_bias_std=np.where(told_bias, bias_std, search.imu.bias_std[:3]),
             told_by=told[0],
             decided=told[1],
         )

@@ -117,7 +117,7 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     span = stream_checks.check_common_span(spans, wait=any(imu.wheel for imu in imus))
     recording = assemble(config, document, imus, streams, span, wheels_known)
     warnings = (*notes, *recording.warnings)
-    text = in_force(known, offsets)
+    text = in_force(known.model_copy(update={"gnss": config.gnss}), offsets)
     return replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
 
 
