@@ -167,6 +167,17 @@ def test_arrays_that_pause_begin_anew_in_stretches(simulated, method, tmp_path):
     assert restarts(agree(config, tmp_path, method)) == ["restart", "pause"]
 
 
+def test_an_imu_that_is_dead_after_a_pause_does_not_hold_the_others_up(simulated, tmp_path):
+    recording = paused(simulated, (85.0, 90.0))
+    first, *others = recording.imus
+    kept = first.time < 80.0
+    dead = ImuStream(first.name, first.time[kept], first.dtheta[kept], first.dvel[kept])
+    config = files.write(replace(recording, imus=(dead, *others)), tmp_path / "recording")
+    solution = agree(config, tmp_path, "enav-fusion")
+    assert restarts(solution) == ["restart"]
+    assert solution.time[-1] > 149.0
+
+
 def test_an_array_at_rest_is_taken_in_stretches(simulated, tmp_path):
     options = replace(simulated.options, standstill=StandstillOptions())
     config = files.write(replace(simulated, options=options), tmp_path / "recording")
