@@ -593,7 +593,7 @@ class Navigator:
         line.append(epoch.time, increments, present[self._order], travel[0], queue)
         assert self._record.part is not None
         self._record.part.take(epoch)
-        self._record.take(epoch.time, line.outputs.states[line.last, 0:3])
+        self._record.take(epoch.time, line.outputs.states[line.last], line.outputs.variances[line.last])
 
     def _bridged(self, time: float, increments: Array, line: Timeline) -> Events:
         """Return the noise of an epoch in which no IMU has data."""
