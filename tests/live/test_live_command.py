@@ -57,7 +57,7 @@ def test_a_replay_prints_states_at_the_rate(replayed: tuple[list[dict[str, float
     said = summary(out)
     assert said["epochs"] == {f"imu{k}": 50 * (50 - 8 + 2) for k in (1, 2, 3)}
     assert said["stopped_by"] == "end of data"
-    assert said["start"]["heading"].startswith("GNSS course")
+    assert said["start"]["heading"].startswith("GNSS accelerations")
     flags = {row["time_s"]: row["dead_reckoning"] for row in rows}
     assert {flag for at, flag in flags.items() if 32.5 < at < 35.9} == {True}
     assert {flag for at, flag in flags.items() if at < 30.0 or at > 37.0} == {False}

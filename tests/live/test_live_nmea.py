@@ -25,6 +25,7 @@ def snapshot(
         "position_std": np.full(3, 0.1),
         "velocity_std": np.full(3, 0.1),
         "phi_covariance": np.zeros(6),
+        "status": "tracking",
     }
     return Snapshot(SimpleNamespace(**values), values["position"], True, dead_reckoning)
 
