@@ -1,6 +1,7 @@
 """The documents hold every key, only JSON's values, and the figures that were put in."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,6 +73,15 @@ def test_a_solution_that_diverged_gives_null_and_says_so():
     assert document["consistency"]["nees_position"] is None
     assert json.dumps(document, allow_nan=False)
     assert any("not finite at 701 of 1201" in warning for warning in document["warnings"])
+
+
+def test_a_std_that_is_no_number_is_told_of():
+    truth = drive()
+    made = solution(truth)
+    variance = made.velocity_variance.copy()
+    variance[700:, 1] = np.inf
+    warnings = summarize(replace(made, velocity_variance=variance), None)["warnings"]
+    assert any("not finite at 501 of 1201" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize(("epochs", "told"), [(1195, False), (1180, True)])

@@ -131,7 +131,7 @@ def test_a_pause_of_some_or_a_short_one_is_none(drive: Recording) -> None:
     assert restart.pauses(paused(drive, 100.0, 150.0, (0, 1))) == []
     assert restart.pauses(paused(drive, 100.0, 100.9)) == []
     (one,) = restart.pauses(paused(drive, 100.0, 150.0))
-    np.testing.assert_allclose(one, (100.0, 150.0), atol=0.03)
+    np.testing.assert_allclose((one.begin, one.end), (100.0, 150.0), atol=0.03)
 
 
 @pytest.mark.parametrize("method", ["enav-fusion", "nav-fusion", "nav-fusion/centralized", "imu-fusion"])
@@ -163,3 +163,43 @@ def test_live_wheels_coast_as_in_a_batch_run() -> None:
     np.testing.assert_array_equal(list(states), whole.time)
     np.testing.assert_array_equal(list(states.values()), rows(whole))
     assert {found.text for found in one.findings} == {found.text for found in whole.findings}
+
+
+@pytest.fixture
+def breaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs whose state is no number from 60 s on, once."""
+    advance = batch.Prepared.advance
+
+    def poisoned(run: batch.Prepared, first: int, last: int) -> None:
+        advance(run, first, last)
+        after = run.inputs.time[first:last] >= 60.0
+        if run.start.time < 60.0:
+            run.outputs.states[first:last][after, 3:6] = np.nan
+
+    monkeypatch.setattr(batch.Prepared, "advance", poisoned)
+
+
+@pytest.mark.usefixtures("breaks")
+def test_after_a_state_that_is_no_number_a_run_begins_anew_live_as_well(drive: Recording) -> None:
+    one, whole = navigator(drive), batch.run(drive, "enav-fusion")
+    assert whole.is_finite.all()
+    (finding,) = [found for found in whole.findings if found.kind == "restart"]
+    assert (finding.severity, finding.from_s) == ("doubt", pytest.approx(59.98))
+    assert np.flatnonzero(np.diff(whole.time) > 0.1).size == 1
+    assert 61.0 <= whole.time[np.searchsorted(whole.time, 60.0)] < 63.0
+    states = play(one, drive, until(drive, 110.0))
+    time = np.array(list(states))
+    place = np.searchsorted(whole.time, time)
+    np.testing.assert_array_equal(whole.time[place], time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole)[place])
+    assert np.count_nonzero(time > 61.0) > 1000
+    assert set(one.findings) == set(whole.findings)
+
+
+@pytest.mark.usefixtures("breaks")
+def test_wheels_without_gnss_that_begin_anew_so_are_not_to_be_used() -> None:
+    whole = batch.run(driven_vehicle.drive(), "triple-ins")
+    assert whole.is_finite.all()
+    (finding,) = [found for found in whole.findings if found.kind == "restart"]
+    assert finding.severity == "serious"
+    assert whole.time[-1] > 110.0

@@ -19,6 +19,7 @@ from polyins.formats import columns, kf_gins, table
 from polyins.formats.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
 from polyins.model.recording import AidingStream, ImuStream, Recording, StandstillOptions
 from polyins.model.rig import AidingSensor
+from polyins.navigate import batch
 from polyins.reading import long_recording
 from polyins.reading.loading import read_config
 from polyins.reading.long_recording import LongRecording, open_long
@@ -165,6 +166,32 @@ def test_arrays_that_pause_begin_anew_in_stretches(simulated, method, tmp_path):
     recording = unsynchronised(paused(simulated, (85.0, 97.0), (145.0, 148.5)))
     config = files.write(recording, tmp_path / "recording")
     assert restarts(agree(config, tmp_path, method)) == ["restart", "pause"]
+
+
+def test_an_imu_that_is_dead_after_a_pause_does_not_hold_the_others_up(simulated, tmp_path):
+    recording = paused(simulated, (85.0, 90.0))
+    first, *others = recording.imus
+    kept = first.time < 80.0
+    dead = ImuStream(first.name, first.time[kept], first.dtheta[kept], first.dvel[kept])
+    config = files.write(replace(recording, imus=(dead, *others)), tmp_path / "recording")
+    solution = agree(config, tmp_path, "enav-fusion")
+    assert restarts(solution) == ["restart"]
+    assert solution.time[-1] > 149.0
+
+
+def test_what_breaks_begins_anew_in_stretches(simulated, tmp_path, monkeypatch):
+    advance = batch.Prepared.advance
+
+    def poisoned(run, first, last):
+        advance(run, first, last)
+        after = run.inputs.time[first:last] >= 90.0
+        run.outputs.variances[first:last][after & (run.start.time < 90.0)] = np.inf
+
+    monkeypatch.setattr(batch.Prepared, "advance", poisoned)
+    config = files.write(simulated, tmp_path / "recording")
+    solution = agree(config, tmp_path, "enav-fusion")
+    assert restarts(solution) == ["restart"]
+    assert solution.is_finite.all()
 
 
 def test_an_array_at_rest_is_taken_in_stretches(simulated, tmp_path):

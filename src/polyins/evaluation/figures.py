@@ -125,7 +125,7 @@ class Figures:
             epochs.interval = usual_interval(time)
         epochs.last = float(time[-1])
         epochs.count += time.size
-        epochs.broken += int(np.count_nonzero(~np.isfinite(part.position).all(axis=1)))
+        epochs.broken += int(np.count_nonzero(~part.is_finite))
         epochs.uncovered += 0 if errors is None else errors.epochs_without_reference
 
 

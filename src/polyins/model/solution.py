@@ -230,6 +230,11 @@ class Solution:
         )
 
     @property
+    def is_finite(self) -> NDArray[np.bool_]:
+        """At which epochs all of the state and of its variances is a number, shape (T,)."""
+        return np.asarray(np.all([np.isfinite(getattr(self, name)).all(axis=1) for name in BY_EPOCH[1:]], axis=0))
+
+    @property
     def innovations(self) -> Innovations:
         """What became of the GNSS positions."""
         return self.measurements.get("GNSS position", NO_INNOVATIONS)

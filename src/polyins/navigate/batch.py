@@ -91,6 +91,18 @@ class Prepared:
         further, epochs = self.further, slice(first, last)
         self.loop(self.navigators, self.inputs, self.outputs, further, self.full_matrices, epochs)
 
+    def until(self, end: int) -> Prepared:
+        """Return a run that is over as if it had ended before an epoch."""
+        inputs, outputs, aligned = self.inputs, self.outputs, self.aligned
+        used = int(np.searchsorted(inputs.event_time, inputs.time[end - 1] + self.recording.options.gnss_snap, "right"))
+        logged = int((end - 2) // self.plan.settings[places.LOG_EVERY]) + 1
+        ends = (end, end, used, used, logged, logged)
+        kept = (array[:count] for array, count in zip(outputs, ends, strict=True))
+        epochs = (array[:end] for array in inputs[:4])
+        events = (array[:used] for array in inputs[4:])
+        part = Aligned(aligned.time[:end], aligned.increments[:end], aligned.findings, aligned.missing[:end])
+        return replace(self, aligned=part, inputs=Inputs(*epochs, *events), outputs=Outputs(*kept))
+
     def at(self, stretch: Aligned) -> Prepared:
         """Return the run at further epochs, of which the first is the last that it has taken."""
         begin = float(stretch.time[0]) + self.recording.options.gnss_snap
@@ -116,24 +128,39 @@ def run(
     """
     taken = choose(find_method(method), recording.rig, imu).all
     of_them = recording.subset(taken)
-    pauses = restart.pauses(of_them)
-    if not pauses:
-        return navigate(prepare(recording, method, imu=imu), progress)
 
     def of_part(
         part: Recording, before: restart.Known | None, pause: restart.Pause | None
     ) -> Iterator[tuple[Solution, restart.Known]]:
         prepared = prepare(restart.begun(part, before, pause), method, imu=imu, before=before)
-        yield navigate(prepared, progress), known(prepared, -1)
+        yield navigated(prepared, progress)
 
-    whole = Solution.joined(list(restart.run_parts(restart.parts_of(recording, pauses), of_part)))
+    parts = restart.parts_of(recording, restart.pauses(of_them))
+    whole = Solution.joined(list(restart.run_parts(parts, of_part, restart.rest_of)))
     return replace(whole, recording_span=_span(of_them))
 
 
-def known(run: Prepared, last: int) -> restart.Known:
-    """Return what a run knows which has taken all epochs up to its row `last`."""
-    state, stride = run.state, int(run.plan.settings[places.STRIDE])
+def known(run: Prepared, last: int, *, broken: bool = False) -> restart.Known:
+    """Return what a run knows which has taken all epochs up to its row `last`; `broken`: see `restart.Known`.
+
+    A run whose state is no number knows of its IMUs what it began with.
+    """
     row, variance = run.outputs.states[last], run.outputs.variances[last]
+    begun = zip(run.recording.rig.imus, run.start.imu_errors, run.start.imu_error_std, strict=True)
+    return restart.Known(
+        time=float(run.inputs.time[last]),
+        position=row[0:3].copy(),
+        velocity=row[3:6].copy(),
+        heading=float(euler_angles(row[None, 6:10])[0, 2]),
+        position_std=np.sqrt(variance[0:3]),
+        imu_errors={imu.name: (own, std) for imu, own, std in begun} if broken else _imu_errors(run),
+        broken=broken,
+    )
+
+
+def _imu_errors(run: Prepared) -> dict[str, tuple[Array, Array]]:
+    """Return what a run has found of its IMUs, and the std of it."""
+    state, stride = run.state, int(run.plan.settings[places.STRIDE])
     errors = {}
     for s, (begin, end) in enumerate(run.bank.spans):
         std = np.sqrt([covariance.variance(state.blocks[s], covariance.NAV + k, stride) for k in range(IMU_ERRORS)])
@@ -141,14 +168,7 @@ def known(run: Prepared, last: int) -> restart.Known:
             first = bank.ERRORS + lane % LANES
             own = state.rows[lane // LANES, first : first + IMU_ERRORS * LANES : LANES].copy()
             errors[run.bank.members[lane].imu.name] = own, std
-    return restart.Known(
-        time=float(run.inputs.time[last]),
-        position=row[0:3].copy(),
-        velocity=row[3:6].copy(),
-        heading=float(euler_angles(row[None, 6:10])[0, 2]),
-        position_std=np.sqrt(variance[0:3]),
-        imu_errors=errors,
-    )
+    return errors
 
 
 def navigate(prepared: Prepared, progress: Callable[[float], None] | None = None) -> Solution:
@@ -165,18 +185,25 @@ def navigate(prepared: Prepared, progress: Callable[[float], None] | None = None
         filter_s += clock.thread_time() - begin
         if progress:
             progress(last / epochs)
-    if prepared.recording.rig.has_wheels:
-        _check_finite(prepared)
     return solution_of(prepared, filter_s, first_call_s)
 
 
-def _check_finite(run: Prepared) -> None:
-    broken = np.flatnonzero(~np.isfinite(run.outputs.states[1:]).all(axis=1))
-    if len(broken):
+def navigated(prepared: Prepared, progress: Callable[[float], None] | None = None) -> tuple[Solution, restart.Known]:
+    """Take the epochs of a run up to the first whose state is no number; returns what is known there as well.
+
+    Raises InputError if it is the first one.
+    """
+    solution = navigate(prepared, progress)
+    broken = np.flatnonzero(~solution.is_finite)
+    if not len(broken):
+        return solution, known(prepared, -1)
+    if not broken[0]:
         raise InputError(
-            f"{run.method.name}: diverged at {run.aligned.time[1:][broken[0]]:.2f} s;"
+            f"{prepared.method.name}: diverged at {solution.time[0]:.2f} s;"
             " expected wheel radii, mounts, clocks and a start heading that fit the motion"
         )
+    cut = prepared.until(int(broken[0]) + 1)
+    return solution_of(cut, solution.filter_s, solution.first_call_s), known(cut, -1, broken=True)
 
 
 def prepare(
@@ -405,7 +432,7 @@ def silences(row: Method, choice: Choice, recording: Recording, aligned: Aligned
     found: list[Finding] = []
     if not fixes and not row.joined and len(choice.blocks) > 1:
         every = stretches(np.asarray(aligned.missing.all(axis=1)))
-        gaps = [(float(aligned.time[max(first - 1, 0)]), float(aligned.time[end - 1])) for first, end in every]
+        gaps = [restart.Pause(float(aligned.time[max(k - 1, 0)]), float(aligned.time[end - 1])) for k, end in every]
         found += restart.coasted(gaps)
     for i, imu in enumerate(recording.rig.imus):
         for first, end in stretches(aligned.missing[:, i]):

@@ -29,6 +29,7 @@ from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
 from polyins.navigate.record import Part, Record
 from polyins.navigate.refusals import NOT_FINITE, Refusals, unfit
+from polyins.navigate.restart import Pause
 from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.starter import Starter, after_start
 from polyins.navigate.timeline import Timeline
@@ -304,8 +305,13 @@ class Navigator:
     def _begin_anew(self, last: float, first: float) -> None:
         """End the run at a pause, from `last` to `first`, s, and look for a start after it."""
         self._step(at_end=True)
-        line = self._timeline
-        before = None if line is None else batch.known(line.run, line.last)
+        if self._starter is None:
+            self._search(Pause(last, first))
+
+    def _search(self, pause: Pause) -> None:
+        """Look for a start after a pause, with what the run before it knows."""
+        line, broken = self._timeline, pause.why == restart.BROKEN
+        before = None if line is None else batch.known(line.run, line.last, broken=broken)
         lost = self._recording.rig.has_wheels and not self._has_fixes
         blank = Recording(self._made.rig, (), geodetic=self._recording.geodetic, options=self._recording.options)
         starter = Starter(
@@ -315,7 +321,7 @@ class Navigator:
             self._made.method,
             self._made.imu,
         )
-        starter.after, starter.before = (last, first), before if lost else None
+        starter.after, starter.before = pause, before if lost else None
         starter.refusals = self._refusals
         if line is not None:
             self._record.findings = list(self.findings)
@@ -588,9 +594,21 @@ class Navigator:
         if epoch.missing.all():
             queue = events.merged(self._bridged(epoch.time, increments, line), queue)
         line.append(epoch.time, increments, present[self._order], travel[0], queue)
+        if self._is_broken(line):
+            return
         assert self._record.part is not None
         self._record.part.take(epoch)
-        self._record.take(epoch.time, line.outputs.states[line.last, 0:3])
+        self._record.take(epoch.time, line.outputs.states[line.last], line.outputs.variances[line.last])
+
+    def _is_broken(self, line: Timeline) -> bool:
+        """Whether the newest state is no number: then the run ends with the last that is one, and begins anew."""
+        states, variances = line.outputs.states, line.outputs.variances
+        if math.isfinite(states[line.last].sum() + variances[line.last].sum()):
+            return False
+        while line.last and not math.isfinite(states[line.last].sum() + variances[line.last].sum()):
+            line.last -= 1
+        self._search(Pause(line.time, line.time + restart.SETTLED, restart.BROKEN))
+        return True
 
     def _bridged(self, time: float, increments: Array, line: Timeline) -> Events:
         """Return the noise of an epoch in which no IMU has data."""
@@ -623,6 +641,7 @@ class Navigator:
                 if refused:
                     self._refuse(refused)
                     return
+            self._is_broken(self._timeline)
 
     def _aid(self, line: Timeline, event: Events) -> str:
         if line.has_event(int(event.kind[0]), float(event.time[0])):

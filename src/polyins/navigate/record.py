@@ -82,12 +82,12 @@ class Record:
     """of those parts and of the pauses"""
     part: Part | None = None
 
-    def take(self, time: float, position: Array) -> None:
+    def take(self, time: float, state: Array, variances: Array) -> None:
         """Count a state."""
         self.first = time if self.epochs == 0 else self.first
         self.last = time
         self.epochs += 1
-        self.broken += not math.isfinite(position.sum())
+        self.broken += not math.isfinite(state.sum() + variances.sum())
 
     def measurements(self, rows: Array | None, wheels: tuple[str, ...]) -> dict[str, Innovations]:
         """Return what became of the measurements; `rows`: of the part that goes on, `wheels`: that give a speed."""

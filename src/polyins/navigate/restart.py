@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,20 @@ from polyins.prepare.alignment import Start
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
-Pause = tuple[float, float]
-"""the last stamp before it and the first after, s"""
+NO_DATA, BROKEN = "no IMU has data", "the state is no number"
+SETTLED = 1.0
+"""s after a state that is no number, which the run before it has seen"""
+
+
+class Pause(NamedTuple):
+    """A time without a state."""
+
+    begin: float
+    """s, the last stamp before it"""
+    end: float
+    """s, the first that may be taken after it"""
+    why: str = NO_DATA
+
 
 HOPELESS, HOPELESS_ON_WHEELS, HOPELESS_BLIND = 1.0, 0.6, 3.0
 """s without data of any IMU, after which the state is found anew: of an array; of wheels with GNSS, which coast; and
@@ -62,6 +74,8 @@ class Known:
     """m"""
     imu_errors: dict[str, tuple[Array, Array]]
     """of each IMU by its name, and their std, (12,) each"""
+    broken: bool = False
+    """whether the state is no number at the epoch after it"""
 
 
 def hopeless(on_wheels: bool, fixes: bool) -> float:
@@ -71,7 +85,7 @@ def hopeless(on_wheels: bool, fixes: bool) -> float:
     return HOPELESS_ON_WHEELS if fixes else HOPELESS_BLIND
 
 
-def pauses(recording: Recording) -> list[tuple[float, float]]:
+def pauses(recording: Recording) -> list[Pause]:
     """Return where no IMU has data for hopelessly long: the last stamp before and the first after, s."""
     limit = hopeless(recording.rig.has_wheels, recording.gnss is not None)
     gaps = []
@@ -81,13 +95,13 @@ def pauses(recording: Recording) -> list[tuple[float, float]]:
     return common_pauses(gaps, limit)
 
 
-def common_pauses(gaps: Iterable[Iterable[Pause]], limit: float) -> list[Pause]:
+def common_pauses(gaps: Iterable[Iterable[tuple[float, float]]], limit: float) -> list[Pause]:
     """Return where all IMUs have a gap longer than a limit, s, within what they measure; `gaps` of each IMU."""
     common = [(-np.inf, np.inf)]
     for known in map(list, gaps):
         both = [(max(a, begin), min(b, end)) for a, b in common for begin, end in known]
         common = [(begin, end) for begin, end in both if end - begin > limit]
-    return [(float(begin), float(end)) for begin, end in common if np.isfinite(end - begin)]
+    return [Pause(float(begin), float(end)) for begin, end in common if np.isfinite(end - begin)]
 
 
 def parts_of(recording: Recording, found: Sequence[Pause]) -> Iterator[tuple[Pause | None, Recording]]:
@@ -96,15 +110,21 @@ def parts_of(recording: Recording, found: Sequence[Pause]) -> Iterator[tuple[Pau
         yield pause, part_of(recording, begin, end, pause)
 
 
+def rest_of(part: Recording, pause: Pause) -> Recording:
+    """Return what is left of a part after a state that is no number."""
+    return part_of(part, np.nextafter(pause.end, -np.inf), np.inf, pause)
+
+
 def borders(found: Sequence[Pause]) -> list[tuple[Pause | None, float, float]]:
     """Return the pause before each part, the time after which its data begin, and that up to which they go, s."""
-    lasts = [-np.inf, *(last for last, _ in found), np.inf]
+    lasts = [-np.inf, *(pause.begin for pause in found), np.inf]
     return [(found[k - 1] if k else None, begin, end) for k, (begin, end) in enumerate(pairwise(lasts))]
 
 
 def run_parts(
     parts: Iterable[tuple[Pause | None, Part]],
     run: Callable[[Part, Known | None, Pause | None], Iterator[tuple[Solution, Known]]],
+    rest: Callable[[Part, Pause], Part],
 ) -> Iterator[Solution]:
     """Run a recording part by part between its pauses; a part that gives no start is left out, with a finding.
 
@@ -117,15 +137,19 @@ def run_parts(
     told: tuple[Finding, ...] = ()
     first: dict[str, object] = {}
     refusal: InputError | None = None
-    for pause, part in parts:
+    ahead = iter(parts)
+    following = next(ahead, None)
+    while following is not None:
+        pause, part = following
         begun = False
+        broken: Known | None = None
         try:
             for solution, knowing in run(part, before, pause):
                 if held is not None:
                     yield held
                 if not begun and pause is not None:
                     told = (*told, restarted(pause, solution.start))
-                begun, before, first = True, knowing, first or solution.start
+                begun, broken, first = True, knowing if knowing.broken else None, first or solution.start
                 found = (*told, *(one for one in solution.findings if one not in told))
                 held = replace(solution, start=first, findings=found)
         except InputError as error:
@@ -134,7 +158,12 @@ def run_parts(
             refusal = refusal or error
             told = told if pause is None else (*told, left_out(pause, str(error)))
         else:
-            told = told if held is None else held.findings
+            told, before = told if held is None else held.findings, knowing
+        if broken is not None:
+            pause = Pause(broken.time, broken.time + SETTLED, BROKEN)
+            following = pause, rest(part, pause)
+        else:
+            following = next(ahead, None)
     if held is None:
         assert refusal is not None
         raise refusal
@@ -144,7 +173,8 @@ def run_parts(
 def left_out(pause: Pause, why: str) -> Finding:
     """Say that what follows a pause gives no start."""
     text = f"{_words(pause)}; what follows is left out: {why}"
-    return Finding("pause", text, from_s=pause[0], to_s=pause[1], size=pause[1] - pause[0])
+    severity: Severity = "note" if pause.why == NO_DATA else "serious"
+    return Finding("pause", text, severity, from_s=pause[0], to_s=pause[1], size=pause[1] - pause[0])
 
 
 def restarted(pause: Pause, start: Mapping[str, object]) -> Finding:
@@ -153,12 +183,13 @@ def restarted(pause: Pause, start: Mapping[str, object]) -> Finding:
     text = f"{_words(pause)}; the state was found anew at {begins:.2f} s (heading: {heading})"
     size = pause[1] - pause[0]
     if heading != UNKNOWN:
-        return Finding("restart", text, from_s=pause[0], to_s=begins, size=size)
+        level: Severity = "note" if pause.why == NO_DATA else "doubt"
+        return Finding("restart", text, level, from_s=pause[0], to_s=begins, size=size)
     remedy = "GNSS tells place and heading again; start.time_s begins a run of its own after the pause"
     return Finding("restart", text, "serious", from_s=pause[0], to_s=begins, size=size, remedy=remedy)
 
 
-def coasted(gaps: list[tuple[float, float]]) -> tuple[Finding, ...]:
+def coasted(gaps: list[Pause]) -> tuple[Finding, ...]:
     """Say that a vehicle without GNSS coasted, s to s, whose blocks take each other's common error for news."""
     found = []
     for gap in gaps:
@@ -171,6 +202,8 @@ def coasted(gaps: list[tuple[float, float]]) -> tuple[Finding, ...]:
 
 
 def _words(pause: Pause) -> str:
+    if pause.why != NO_DATA:
+        return f"{pause.why} after {pause.begin:.2f} s"
     return f"no IMU has data for {pause[1] - pause[0]:.1f} s from {pause[0]:.2f} s"
 
 
@@ -180,13 +213,15 @@ def is_lost(recording: Recording) -> bool:
 
 
 def begun(part: Recording, before: Known | None, pause: Pause | None) -> Recording:
-    """Return a part with what is known before it; raise InputError if it lacks what a start is made from."""
+    """Return a part with what is known before the pause; raise InputError if it lacks what a start is made from."""
+    if pause is None:
+        return part
     lacking = [stream.name for stream in part.imus if stream.time.size < 2]
     if lacking and (part.rig.has_wheels or len(lacking) == len(part.imus)):
         raise InputError(f"no data from {lacking[0]}")
     if part.gnss is not None and not part.gnss.time.size:
         raise InputError("no fix from GNSS")
-    return part if pause is None else after(part, before, is_lost(part))
+    return after(part, before, is_lost(part))
 
 
 def after(recording: Recording, before: Known | None, lost: bool) -> Recording:

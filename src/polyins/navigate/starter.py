@@ -15,7 +15,7 @@ from polyins.model.recording import GnssStream, ImuStream, Recording
 from polyins.navigate import batch, restart
 from polyins.navigate.choice import choose
 from polyins.navigate.refusals import Refusals, unfit
-from polyins.navigate.restart import Known
+from polyins.navigate.restart import Known, Pause
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.navigate.start import same
 from polyins.prepare import course, timesync
@@ -70,7 +70,7 @@ class Starter:
 
         `needs_fix`: the position is to come from GNSS. `method`, `imu`: as for `Navigator`.
         """
-        self.after: tuple[float, float] | None = None
+        self.after: Pause | None = None
         """s, s: the pause of all IMUs after which the state is looked for"""
         self.before: Known | None = None
         """what was known before it, where that is all that there is of place and heading"""
@@ -99,6 +99,8 @@ class Starter:
 
     def take(self, sample: Sample) -> tuple[Start, list[Sample]] | None:
         """Take a sample; returns the start, once it is found, and all that was collected in the order of stamps."""
+        if self.after is not None and sample.time < self.after.end:
+            return None
         if isinstance(sample, SensorSample):
             self.shown.append(sample)
             return None
@@ -167,7 +169,7 @@ class Starter:
             self.findings.append(restart.left_out(self.after, self.why))
         else:
             self.blank = restart.after(self.blank, None, lost=False)
-        self.after = self.newest_imu, time
+        self.after = Pause(self.newest_imu, time)
         for rows in (*self.imus.values(), self.fixes):
             rows.cut(time)
         self.shown = [sample for sample in self.shown if sample.time >= time]

@@ -91,12 +91,19 @@ class LongRecording:
     def parts(self, found: Sequence[Pause]) -> Iterator[tuple[Pause | None, LongRecording]]:
         """Give the parts between pauses, each with the one before it."""
         for pause, begin, end in borders(found):
-            streams = self.head.imus if pause is None else tuple(self._beginning_after(begin, pause[1]))
-            head = part_of(replace(self.head, imus=streams), begin, end, pause)
-            extents = tuple(map(partial(_extent_within, begin, end), self.extents, head.imus))
-            there = [one for one in extents if one.first <= one.last]
-            span = _common(there, wait=not self._bridge) if there else (begin, end)
-            yield pause, replace(self, head=head, extents=extents, span=span, within=(begin, end))
+            yield pause, self._between(begin, end, pause)
+
+    def rest(self, pause: Pause) -> LongRecording:
+        """Return what is left of it after a state that is no number."""
+        return self._between(float(np.nextafter(pause.end, -np.inf)), self.within[1], pause)
+
+    def _between(self, begin: float, end: float, pause: Pause | None) -> LongRecording:
+        streams = self.head.imus if pause is None else tuple(self._beginning_after(begin, pause.end))
+        head = part_of(replace(self.head, imus=streams), begin, end, pause)
+        extents = tuple(map(partial(_extent_within, begin, end), self.extents, head.imus))
+        there = [one for one in extents if one.first <= one.last]
+        span = _common(there, wait=not self._bridge) if there else (begin, end)
+        return replace(self, head=head, extents=extents, span=span, within=(begin, end))
 
     def check(self) -> None:
         """Raise InputError if the IMUs have less than two seconds in common."""

@@ -111,7 +111,7 @@ def _parts(
                 progress((known.time - span[0]) / (span[1] - span[0]))
             yield solution, known
 
-    for part in restart.run_parts(recording.parts(recording.pauses()), of_part):
+    for part in restart.run_parts(recording.parts(recording.pauses()), of_part, LongRecording.rest):
         yield replace(part, recording_span=span)
 
 
@@ -133,7 +133,10 @@ def _stretched(
             *votes,
             *silent.findings(),
         )
-        yield replace(batch.navigate(run), findings=found), batch.known(run, -1)
+        solution, known = batch.navigated(run)
+        yield replace(solution, findings=found), known
+        if known.broken:
+            return
     if run is None:
         raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")
 
