@@ -59,7 +59,7 @@ def of_turning(rig: Rig, aligned: Aligned) -> tuple[Finding, ...]:
     down = mean_across.imag - known[2]
     stands = (rests | ~on_wheel).all(axis=1)
     if stands.any():
-        down = down - np.median(down[stands], axis=0)
+        down = mean_across.imag - mean_across.imag[np.argmax(stands)]
     turn = np.where(usable & ~steered, np.where(on_wheel, np.abs(turned), np.abs(down)), np.nan)
     change = np.where(usable & on_wheel, np.abs(mean_across - bias - tilt * mean_spin), 0.0)
     return (*_differing(rig, turn, edges), *_changing(rig, change, edges))
