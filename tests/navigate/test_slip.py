@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,11 +9,12 @@ from driven_vehicle import changed, off
 from playing import events, navigator_for, play, rows
 from slipping_wheels import rolling, slipping
 
-from polyins.evaluation.verdict import of_measurements
+from polyins.evaluation.verdict import of_live, of_measurements
 from polyins.model.findings import Finding
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
 from polyins.navigate import batch
+from polyins.navigate.navigator import Navigator
 
 METHOD = "triple-ins"
 SHORT = {
@@ -96,14 +98,32 @@ def test_radius_that_is_wrong_throughout() -> None:
     assert wrong.to_s > 85.0
 
 
-def test_a_replay_is_the_batch_run_to_the_last_bit() -> None:
+def test_a_replay_is_the_batch_run_to_the_last_bit_and_finds_the_same(tmp_path: Path) -> None:
     prepared = batch.prepare(until(slipping(SHORT), 45.0), METHOD)
-    states = play(navigator_for(prepared, delay=0.1), prepared.recording, events(prepared.recording))
+    played = events(prepared.recording)
+    middle = next(n for n, event in enumerate(played) if event.arrives > 40.7)
+    navigator = navigator_for(prepared, delay=0.1)
+    states = play(navigator, prepared.recording, played[:middle])
+    navigator.save(tmp_path / "checkpoint")
+    resumed = Navigator.resume(tmp_path / "checkpoint")
+    states |= play(resumed, prepared.recording, played[middle:])
     solution = batch.navigate(prepared)
     assert len(found(solution)) == 2
+    assert of_measurements(resumed.measurements) == of_measurements(solution.measurements)
+    assert set(found(solution)) <= set(of_live(resumed).findings)
     shown = np.isin(solution.time, list(states))
     assert shown.sum() > 5000
     np.testing.assert_array_equal([states[time] for time in solution.time[shown]], rows(solution)[shown])
+
+
+def test_a_slip_that_is_believed_after_a_while_ends_without_harm() -> None:
+    both = [(60.0, 8.0, 0.3)]
+    recording = slipping({"left": both, "right": both})
+    judged, unjudged = batch.run(recording, METHOD), batch.run(recording.without_gate(), METHOD)
+    assert {one.severity for one in found(judged)} == {"doubt"}
+    wheels = judged.measurements["wheel speed"]
+    assert wheels.accepted[(wheels.time > 68.0) & (wheels.time < 75.0)].all()
+    assert off(judged, recording)[-1] < off(unjudged, recording)[-1]
 
 
 def until(recording: Recording, end: float) -> Recording:

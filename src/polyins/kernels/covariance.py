@@ -47,6 +47,7 @@ FORCE = _take(3)  # m/s^2
 VEHICLE = _take(9)  # C_nv
 METRIC = _take(3)  # metres per unit of each coordinate at the last update
 COUNTS = _take(1)  # 1, or 0 while none of its members counts: then it is left out of what is merged
+FORWARD = _take(1)  # speed of the vehicle as this block has it, where several are merged, m/s
 # P speaks of the IMU errors divided by 1 less LOST, and is owed half of their noise over OWED: see `_scale`
 LOST = _take(LARGEST)
 OWED = _take(1)  # s

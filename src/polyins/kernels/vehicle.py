@@ -248,6 +248,7 @@ def merge(rows: Array, blocks: Array, spans: Array, lenders: Array) -> None:
         merged[covariance.VELOCITY] += un - bn
         merged[covariance.VELOCITY + 1] += ue - be
         merged[covariance.VELOCITY + 2] += ud - bd
+        block[covariance.FORWARD] = v[0] * (un - bn) + v[3] * (ue - be) + v[6] * (ud - bd)
         for k in range(3):
             merged[covariance.POSITION + k] += block[covariance.POSITION + k] - blocks[base, covariance.POSITION + k]
         q0 += block[covariance.QUATERNION]

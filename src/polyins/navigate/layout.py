@@ -222,6 +222,7 @@ def _fill_scalars(scalars: Array, recording: Recording, start: Start) -> None:
     scalars[places.SLIP_USUAL] = 1.0
     scalars[places.SLIP_COUNT] = slip.SOON
     scalars[places.SLIP_SINCE] = np.inf
+    scalars[places.SLIP_TRUSTED] = scalars[places.SLIP_BELIEVED + 1] = -np.inf
     scalars[places.EARTH : places.EARTH + 5] = (
         float(recording.geodetic),
         latitude,

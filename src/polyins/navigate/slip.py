@@ -7,12 +7,13 @@ a mean speed v_i, which the mean rate of turn w takes from its place y_i to the 
 
 and the IMUs have gone ahead with the mean speed p, tau s after the last speed:
 
-    e_i = u_i - p - a tau,
+    e_i = u_i - p - a t,
 
-where a is the acceleration by which they were off lately. Wheels disagree if the u_i spread by `SURE` times what is
-expected of wheels that roll; they are off together if the mean of e_i is by `SURE` times what is usual, and by |a| for
-each second in which none was believed. A slip that lasts as long as it is from one speed to the next covers one of
-the two parts whole.
+where a is the acceleration by which they were off lately, and t = tau and the time in which none was believed. Wheels
+disagree if the u_i spread by `SURE` times what is expected of wheels that roll. They are off together if the mean of
+e_i is by `SURE` times what is usual, and by |a| t, and no block of IMUs is off the others by half of that. From then on
+they are until it is less than half of what it was, or no more than the IMUs may be off by then. A slip that lasts as
+long as it is from one speed to the next covers one of the two parts whole.
 """
 
 from __future__ import annotations
@@ -29,8 +30,11 @@ from polyins.navigate.state import (
     FORWARD,
     GATE_LIMIT,
     SLIP,
+    SLIP_BELIEVED,
     SLIP_COUNT,
+    SLIP_LEAP,
     SLIP_SINCE,
+    SLIP_TRUSTED,
     SLIP_USUAL,
     STRIDE,
     TIME,
@@ -42,20 +46,21 @@ from polyins.navigate.state import (
 
 SECONDS, TURNED, AHEAD, ROLLED = range(4)
 """places in a row of `State.rolled`: how long, s; rad to the right; m ahead as the IMUs have it; from here on m of each
-wheel, NaN where it does not measure"""
+wheel, NaN where it does not measure, and then m ahead as each block has it, NaN where it does not count"""
 BEFORE, WITHIN = 0, 1
 """its rows: before the window of the speed, and within it"""
 
-LEFT_OUT, OFF, EXPECTED, OFFSET, PER_SECOND, DRIFT = range(6)
+LEFT_OUT, OFF, EXPECTED, MEAN_OFF, OFFSET, PER_SECOND, DRIFT = range(7)
 """places in `state.SLIP`: which wheels are left out, a bit for each; by how much the speed of the worst of them is off,
-and the speed of the IMUs, m/s; mean e of the latest part over the std of the speed, NaN if it is not judged; that e
-over tau, and a, m/s^2"""
+and the speed of the IMUs, m/s; mean e of the latest part, m/s, and over the std of the speed, NaN if it is not judged;
+that e over tau, and a, m/s^2"""
 UNEXPLAINED, USED_AGAIN = 40, 41
 """bits: wheels disagree, and none is nearer to the IMUs; none was believed for so long that all are again"""
 FOUND = 7
 """place of the first three in a row of `Outputs.innovations`"""
 
-SURE = 6.0
+SURE, STAYS = 6.0, 2.0
+"""times what is usual, by which wheels are off together, and stay so once they were"""
 ROUGH, ROUGH_SHARE = 0.005, 0.0025
 """m/s, and of the speed: by how much wheels that roll are expected to differ; those of a car on a road do by half of
 it, rms, and by four times that at most"""
@@ -72,9 +77,14 @@ NEARER, ODDS = 3.0, 7.0
 much likelier it is"""
 MOVING, SHORTEST = 0.3, 0.05
 """m/s, s: slower wheels, and shorter parts, are not judged"""
-LONGEST, FAIR = 6.0, 0.25
-"""s without a wheel that is believed, after which it is as likely the IMUs that are wrong; the sooner, the farther the
-mean square by which they are off exceeds this share of what they state"""
+LONGEST, QUIET = 6.0, 8.0
+"""s without a wheel that is believed, after which it is as likely the IMUs that are wrong; and s for which all are
+believed after that if they are off, and within which a slip that was believed may end: then the IMUs are off"""
+HALF, BACK = 0.5, 2.0
+"""times that by which wheels were off when they began to be withheld: off by less they roll again; and when they were
+believed: off by less the other way they have come back"""
+OF_ONE = 0.5
+"""of what wheels are off: farther from the mean of all blocks, one of them may be what is wrong"""
 
 _VELOCITY, _SPEED_SCALE = place("velocity"), place("speed_scale")
 
@@ -92,6 +102,10 @@ def note_way(state: State, plan: Plan, inputs: Inputs, k: int, fraction: float, 
     scalars[FORWARD] = forward
     for i in range(plan.wheels.shape[0]):
         part[ROLLED + i] += fraction * inputs.travel[k, 2 + i]
+    first = ROLLED + plan.wheels.shape[0]
+    for s in range(plan.spans.shape[0]):
+        block = state.blocks[s]
+        part[first + s] += dt * block[covariance.FORWARD] if block[covariance.COUNTS] != 0.0 else math.nan
 
 
 @scalar_kernel
@@ -144,7 +158,7 @@ def _judge(state: State, plan: Plan, part: Array, since: float, alone: float) ->
         return
     scale = (1.0 + state.rows[first // LANES, bank.SPEED_SCALE + first % LANES]) / part[SECONDS]
     turning = part[TURNED] / part[SECONDS]
-    p = part[AHEAD] / part[SECONDS] + scalars[SLIP + DRIFT] * since
+    p = part[AHEAD] / part[SECONDS] + scalars[SLIP + DRIFT] * (alone + since)
     low, high, near, far, nearest, fast = math.inf, -math.inf, math.inf, 0.0, 0.0, abs(p)
     off = 0.0
     for i in range(plan.wheels.shape[0]):
@@ -159,9 +173,14 @@ def _judge(state: State, plan: Plan, part: Array, since: float, alone: float) ->
         return
     spread, off, rough = high - low, off / count, ROUGH + ROUGH_SHARE * fast
     std = math.sqrt(_variance(state, plan, fast) + rough * rough)
-    scalars[SLIP + OFFSET], scalars[SLIP + PER_SECOND] = off / std, off / since
+    scalars[SLIP + MEAN_OFF], scalars[SLIP + OFFSET], scalars[SLIP + PER_SECOND] = off, off / std, off / since
     usual = std * math.sqrt(max(LEAST, scalars[SLIP_USUAL]))
-    limit = SURE * usual + abs(scalars[SLIP + DRIFT]) * alone
+    limit = SURE * usual if scalars[SLIP_SINCE] == math.inf else max(STAYS * usual, HALF * abs(scalars[SLIP_LEAP]))
+    limit = max(limit, abs(scalars[SLIP + DRIFT]) * (alone + since))
+    if abs(off) > limit and _come_back(scalars, off):
+        scalars[SLIP_TRUSTED] = max(scalars[SLIP_TRUSTED], scalars[TIME])
+    if abs(off) > limit and _farthest(plan, part) > OF_ONE * abs(off):
+        limit = math.inf
     differ = SURE * rough
     if spread <= differ and abs(off) <= limit:
         return
@@ -175,6 +194,28 @@ def _judge(state: State, plan: Plan, part: Array, since: float, alone: float) ->
             u = scale * part[ROLLED + i] + turning * plan.wheels[i]
             if abs(u - nearest) > differ:
                 _add(scalars, i, u - p, p)
+
+
+@scalar_kernel
+def _come_back(scalars: Array, off: float) -> bool:
+    """Whether wheels are off since a slip ends that was believed, and the IMUs have its speed."""
+    believed, lately = scalars[SLIP_BELIEVED], scalars[TIME] - scalars[SLIP_BELIEVED + 1] <= QUIET
+    back: bool = lately and believed * off < 0.0 and abs(off) < BACK * abs(believed)
+    return back
+
+
+@scalar_kernel
+def _farthest(plan: Plan, part: Array) -> float:
+    """Return by how much the mean speed of a block is off that of all at most, m/s."""
+    first, total, count, farthest = ROLLED + plan.wheels.shape[0], 0.0, 0, 0.0
+    for s in range(plan.spans.shape[0]):
+        if math.isfinite(part[first + s]):
+            total, count = total + part[first + s], count + 1
+    for s in range(plan.spans.shape[0]):
+        if math.isfinite(part[first + s]):
+            farthest = max(farthest, abs(part[first + s] - total / count))
+    mean: float = farthest / part[SECONDS]
+    return mean
 
 
 @scalar_kernel
@@ -195,7 +236,9 @@ def some_roll(state: State, plan: Plan) -> bool:
     alone = max(0.0, scalars[TIME] - before - within - scalars[SLIP_SINCE])
     _judge(state, plan, state.rolled[BEFORE], 0.5 * before, alone)
     _judge(state, plan, part, before + 0.5 * within, alone)
-    if _waited(scalars):
+    if scalars[TIME] - scalars[SLIP_SINCE] > LONGEST:
+        scalars[SLIP_TRUSTED] = scalars[TIME]
+    if scalars[TIME] <= scalars[SLIP_TRUSTED]:
         return True
     for i in range(plan.wheels.shape[0]):
         slips = int(scalars[SLIP + LEFT_OUT]) >> i & 1 != 0
@@ -206,16 +249,10 @@ def some_roll(state: State, plan: Plan) -> bool:
 
 
 @scalar_kernel
-def _waited(scalars: Array) -> bool:
-    waited: bool = scalars[TIME] - scalars[SLIP_SINCE] > LONGEST * min(1.0, FAIR / scalars[SLIP_USUAL])
-    return waited
-
-
-@scalar_kernel
 def leave_out(state: State, plan: Plan, measurement: Array) -> None:
     """Make the mean speed that of the wheels that are believed, still as the point between all of them has it."""
     left_out, part = int(state.scalars[SLIP + LEFT_OUT]), state.rolled[WITHIN]
-    if left_out & ((1 << plan.wheels.shape[0]) - 1) == 0 or _waited(state.scalars):
+    if left_out & ((1 << plan.wheels.shape[0]) - 1) == 0 or state.scalars[TIME] <= state.scalars[SLIP_TRUSTED]:
         return
     every, some, count, kept = 0.0, 0.0, 0, 0
     for i in range(plan.wheels.shape[0]):
@@ -236,18 +273,27 @@ def conclude(state: State, plan: Plan, status: int, innovation: Array) -> None:
         scalars[SLIP + LEFT_OUT] = scalars[SLIP + OFF] = scalars[SLIP + EXPECTED] = 0.0
         scalars[SLIP + OFFSET] = math.nan
     left_out = int(scalars[SLIP + LEFT_OUT])
-    if status == update.SLIPPED:
+    if status in (update.SLIPPED, update.REJECTED):
+        if scalars[SLIP_SINCE] == math.inf:
+            scalars[SLIP_LEAP] = scalars[SLIP + MEAN_OFF]
         began = scalars[TIME] - state.rolled[BEFORE, SECONDS] - state.rolled[WITHIN, SECONDS]
         scalars[SLIP_SINCE] = min(scalars[SLIP_SINCE], began)
-    elif _waited(scalars) and left_out & every != 0:
-        left_out |= 1 << USED_AGAIN
     elif status != update.UNUSED:
+        off = scalars[SLIP_LEAP] if scalars[SLIP_SINCE] < math.inf else scalars[SLIP + MEAN_OFF]
         scalars[SLIP_SINCE] = math.inf
+        if scalars[TIME] <= scalars[SLIP_TRUSTED] and left_out & every != 0:
+            left_out |= 1 << USED_AGAIN
+            scalars[SLIP_TRUSTED] = scalars[TIME] + QUIET
+            if _come_back(scalars, off):
+                scalars[SLIP_BELIEVED] = off = 0.0
+        lately = scalars[TIME] - scalars[SLIP_BELIEVED + 1] <= QUIET
+        if not lately or abs(off) > abs(scalars[SLIP_BELIEVED]):
+            scalars[SLIP_BELIEVED], scalars[SLIP_BELIEVED + 1] = off, scalars[TIME]
     if math.isfinite(scalars[SLIP + OFFSET]) and (left_out == 0 or left_out >> USED_AGAIN != 0):
         _learn(scalars)
     innovation[FOUND] = left_out
     innovation[FOUND + 1], innovation[FOUND + 2] = scalars[SLIP + OFF], scalars[SLIP + EXPECTED]
-    scalars[SLIP + LEFT_OUT] = scalars[SLIP + OFF] = scalars[SLIP + EXPECTED] = 0.0
+    scalars[SLIP + LEFT_OUT] = scalars[SLIP + OFF] = scalars[SLIP + EXPECTED] = scalars[SLIP + MEAN_OFF] = 0.0
     scalars[SLIP + OFFSET] = math.nan
     for row in range(2):
         for n in range(state.rolled.shape[1]):

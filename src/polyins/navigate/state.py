@@ -33,10 +33,13 @@ WINDOW_FILLED = _take(1)  # epochs in it; below zero: none is open
 WINDOW_TRAVEL = _take(1)  # what the wheels rolled in it, m
 WINDOW_LATERAL = _take(1)  # m to the right of the axle's middle: the mean place of the wheels that give the speed
 FORWARD = _take(1)  # speed of the vehicle at the last epoch, m/s
-SLIP = _take(6)  # what is found of the wheels at a speed, see `navigate.slip`
+SLIP = _take(7)  # what is found of the wheels at a speed, see `navigate.slip`
 SLIP_USUAL = _take(1)  # mean square by which wheels are off together, over the variance of their speed
 SLIP_COUNT = _take(1)  # speeds from which that is known
+SLIP_LEAP = _take(1)  # by how much all were off when they began to be withheld, m/s
+SLIP_BELIEVED = _take(2)  # by how much all were off at most that were believed lately, m/s, and when, s
 SLIP_SINCE = _take(1)  # since when no wheel is believed, s; infinity: some are
+SLIP_TRUSTED = _take(1)  # until when all are believed whatever the IMUs have, s
 PREVIOUS = _take(4)  # mean rate of a virtual IMU and the length of its interval, see `fuse.average_increments`
 EARTH = _take(5)  # see `earth.evaluate`: geodetic, latitude, its sine and cosine, plane gravity
 SCALARS = _layout.size
@@ -80,7 +83,7 @@ class State(NamedTuple):
     """(6, blocks): since when each is silent, and since when a silent one has data again, s; below zero: not; and while
     it is, the variances of position, velocity, tilt and heading that pauses of all IMUs have added"""
     rolled: Array
-    """(2, 3 + wheels): the way since the last speed, see `navigate.slip`"""
+    """(2, 3 + wheels + blocks): the way since the last speed, see `navigate.slip`"""
 
 
 class Plan(NamedTuple):
@@ -195,7 +198,7 @@ def empty_state(rows: int, blocks: int, wheels: int, merged: bool, stride: int, 
         (joint, joint),
         (SCALARS,),
         (6, blocks),
-        (2, 3 + wheels),
+        (2, 3 + wheels + blocks),
     )
     ends = np.cumsum([-(-math.prod(shape) // EIGHT) * EIGHT for shape in shapes])
     memory = layout.zeros(int(ends[-1]))

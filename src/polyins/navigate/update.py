@@ -20,6 +20,7 @@ from polyins.navigate.state import (
     GATE_LIMIT,
     INTERVAL,
     RECEIVER,
+    SLIP_TRUSTED,
     STRIDE,
     TIME,
     Further,
@@ -290,7 +291,7 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) 
     else:
         passes = innovation[NIS] <= plan.settings[GATE_LIMIT] or _passes_with_caution(plan, work, rows)
     if kind != kinds.GNSS_POSITION:
-        if passes:
+        if passes or (kind == kinds.WHEEL_SPEED and scalars[TIME] <= scalars[SLIP_TRUSTED]):
             return ACCEPTED
         if not kinds.DEWEIGHTS[kind]:
             return REJECTED

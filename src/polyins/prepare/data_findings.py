@@ -9,6 +9,7 @@ from polyins.prepare.delays import delays
 from polyins.prepare.fixes import of_fixes
 from polyins.prepare.noise import noisy
 from polyins.prepare.timesync import Aligned
+from polyins.prepare.turning import of_turning
 from polyins.prepare.votes import disagreements
 
 
@@ -20,4 +21,10 @@ def of_data(recording: Recording, aligned: Aligned, end: float) -> tuple[Finding
     """
     rig, gnss, blocks = recording.rig, recording.gnss, Blocks.of(aligned)
     fixes = () if gnss is None else of_fixes(gnss, recording.geodetic, end)
-    return (*disagreements(rig, aligned), *noisy(rig, blocks), *delays(recording, blocks), *fixes)
+    return (
+        *disagreements(rig, aligned),
+        *of_turning(rig, aligned),
+        *noisy(rig, blocks),
+        *delays(recording, blocks),
+        *fixes,
+    )
