@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from polyins.checks.stream_checks import Axes, upright_axes
+from polyins.config import NOISE_GRADES
 from polyins.config.yaml_document import Document, as_document
 from polyins.errors import InputError
 from polyins.files import find
@@ -17,6 +18,8 @@ from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
+from polyins.model.recording import usual_interval
+from polyins.model.rig import DEG, HOUR
 from polyins.reading import loading
 from polyins.reading.guess import guess_columns, read_stream
 from polyins.reading.loading import Settings
@@ -24,6 +27,10 @@ from polyins.tools.inspect import describe
 
 CHECK = "# CHECK:"
 TRACK_FORMATS = {"kf-gins-gnss": "kf-gins"}
+GRADE = "consumer-mems"
+FEWEST_SHAKEN = 100
+"""rows that tell how much they shake"""
+MEDIAN_TO_STD = 1.4826
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
 FEWEST_MEANS = 20
@@ -169,8 +176,40 @@ def _imu_lines(number: int, imu: Source, speeds: list[Source]) -> list[str]:
         *lines,
         *_axes_lines(imu, facts, speeds),
         f"    position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
-        f"    noise: consumer-mems  {CHECK} a grade (consumer-mems, industrial-mems, tactical) or figures",
+        _noise_line(imu.rows),
     ]
+
+
+def _noise_line(rows: ImuRows) -> str:
+    """Return a grade, or where the rows shake more than that the random walks that this makes."""
+    angle, velocity = shaking(rows)
+    usual = NOISE_GRADES[GRADE]
+    grades = f"a grade ({', '.join(NOISE_GRADES)}) or figures"
+    walks = {
+        "angle_random_walk_deg_sqrt_h": angle / DEG * np.sqrt(HOUR),
+        "velocity_random_walk_m_s_sqrt_h": velocity * np.sqrt(HOUR),
+    }
+    if not any(walk > usual[key] for key, walk in walks.items()):
+        return f"    noise: {GRADE}  {CHECK} {grades}"
+    given = ", ".join(f"{key}: {max(walk, usual[key]):.3g}" for key, walk in walks.items())
+    return f"    noise: {{grade: {GRADE}, {given}}}  {CHECK} {grades}; what shakes from row to row is taken for noise"
+
+
+def shaking(rows: ImuRows) -> tuple[float, float]:
+    """Return the random walks, rad/sqrt(s) and m/s/sqrt(s), that vibration makes, of the worst axis.
+
+    What changes from row to row is taken for white: of second differences a steady motion is no part, and their
+    variance is six times that of what is white. Their median size is not moved by shocks.
+    """
+    if len(rows.time) < FEWEST_SHAKEN:
+        return 0.0, 0.0
+    step = usual_interval(rows.time)
+    sizes = []
+    for increments in (rows.dtheta, rows.dvel):
+        changes = np.abs(np.diff(increments, 2, axis=0))
+        white = float(np.nanmedian(changes, axis=0).max()) * MEDIAN_TO_STD / np.sqrt(6.0)
+        sizes.append(white / np.sqrt(step) if step > 0.0 else 0.0)
+    return sizes[0], sizes[1]
 
 
 def _axes_lines(imu: Source, facts: dict[str, Any], speeds: list[Source]) -> list[str]:
