@@ -12,8 +12,11 @@ import pytest
 from polyins.errors import InputError
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, read_log
-from polyins.formats.rows import intervals
+from polyins.formats.rows import Track, intervals
+from polyins.formats.rtklib import read_gnss
+from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG
+from polyins.reading.guess import read_stream
 from polyins.reading.loading import load, load_settings
 from polyins.tools.inspect import inspect
 from polyins.tools.propose import propose, settings_of
@@ -169,12 +172,55 @@ def test_numbers_without_header_are_not_taken_for_kf_gins(name: str, logs: Path)
 
 
 def test_both_orders_of_thirteen_columns(logs: Path) -> None:
-    from polyins.formats.kf_gins import read_gnss
+    from polyins.formats import kf_gins
 
-    first, matlab = (read_gnss(logs / "cases" / "kf-gins-13" / name) for name in ("velocity-first.txt", "matlab.txt"))
+    first, matlab = (
+        kf_gins.read_gnss(logs / "cases" / "kf-gins-13" / name) for name in ("velocity-first.txt", "matlab.txt")
+    )
     np.testing.assert_array_equal(first.velocity, matlab.velocity)
     np.testing.assert_array_equal(first.position_std, matlab.position_std)
     assert matlab.position_std is not None
     np.testing.assert_allclose(matlab.position_std, np.tile([0.02, 0.02, 0.04], (len(matlab.time), 1)))
     assert first.warnings == ()
     assert "taken as std" in matlab.warnings[0]
+
+
+POSITIONS = [
+    "ecef_gpst2_111_dd",
+    "header_missing",
+    "lla_gpst2_111_dd",
+    "lla_gpst2_111_ds",
+    "lla_gpst_000_dd",
+    "lla_jst_111_dd",
+    "lla_utc_111_dd",
+    "spirent",
+]
+
+
+@pytest.mark.parametrize("name", POSITIONS)
+def test_positions_of_rtklib_in_all_forms(name: str, logs: Path, expected: dict[str, Any]) -> None:
+    facts = expected[f"rtklib-pos/{name}.pos"]["gnss"]["pos"]
+    track, _ = read_stream(logs / "rtklib-pos" / f"{name}.pos")
+    assert isinstance(track, Track)
+    assert len(track.time) == facts["rows"]
+    for row, sample in facts["sample"].items():
+        at = int(row)
+        assert track.time[at] == pytest.approx(sample[0], abs=1e-6)
+        np.testing.assert_allclose(track.position[at, :2] / DEG, sample[1:3], rtol=0.0, atol=2e-10)
+        assert track.position[at, 2] == pytest.approx(sample[3], abs=2e-4)
+        if "ecef" not in name and len(sample) > 9:
+            assert track.velocity is not None
+            np.testing.assert_allclose(track.velocity[at], np.array(sample[9:12]) * [1, 1, -1], atol=1e-12)
+
+
+def test_ecef_and_degrees_of_one_drive(logs: Path) -> None:
+    folder = logs / "cases" / "pos-jst-ecef"
+    tracks = [read_gnss(folder / f"{name}.pos") for name in ("gpst", "utc", "jst", "ecef-gpst", "ecef-jst")]
+    for track in tracks:
+        assert (track.time[0], track.time[-1]) == pytest.approx((36000.25, 36010.25), abs=1e-3)
+        assert track.velocity is not None
+        assert track.position_std is not None
+        off = displacement(track.position, tracks[0].position[0], True)
+        np.testing.assert_allclose(off, displacement(tracks[0].position, tracks[0].position[0], True), atol=1e-3)
+        np.testing.assert_allclose(track.velocity, tracks[0].velocity, atol=1e-4)
+        np.testing.assert_allclose(track.position_std, np.tile([0.02, 0.02, 0.04], (41, 1)), atol=5e-4)

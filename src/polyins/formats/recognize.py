@@ -16,6 +16,7 @@ from polyins.files import find, read_head
 from polyins.formats import kf_gins
 from polyins.formats.columns import PARQUET_MAGIC
 from polyins.formats.log import Log
+from polyins.formats.rtklib import has_rows
 from polyins.model.recording import Array
 
 HEAD_BYTES = 16384
@@ -115,7 +116,9 @@ def data_format(path: str | Path) -> str:
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
         return _xsens(path, lines)
-    if lines[0].startswith("%") and any("latitude" in line for line in lines):
+    if (lines[0].startswith("%") and any(re.search("latitude|-ecef|baseline", line) for line in lines)) or has_rows(
+        rows
+    ):
         return "rtklib-pos"
     if any(": " in line or line.endswith(":") for line in rows[:20]):
         return "configuration"
