@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from polyins import cli
 from polyins.errors import InputError
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, read_log
@@ -224,3 +226,53 @@ def test_ecef_and_degrees_of_one_drive(logs: Path) -> None:
         np.testing.assert_allclose(off, displacement(tracks[0].position, tracks[0].position[0], True), atol=1e-3)
         np.testing.assert_allclose(track.velocity, tracks[0].velocity, atol=1e-4)
         np.testing.assert_allclose(track.position_std, np.tile([0.02, 0.02, 0.04], (41, 1)), atol=5e-4)
+
+
+@pytest.mark.parametrize("name", ["neo-m8l", "neo-m8u", "zed-f9p-hp", "zed-f9r"])
+def test_positions_of_ublox(name: str, logs: Path, expected: dict[str, Any]) -> None:
+    log, wanted = read_log(logs / "ubx" / f"{name}.ubx"), expected[f"ubx/{name}.ubx"]["gnss"]
+    assert set(log.tracks) == {kind for kind in wanted if kind.startswith("NAV")}
+    for kind, track in log.tracks.items():
+        facts = wanted[kind]
+        assert len(track.time) == facts["rows_3d_fix"]
+        assert (track.time[0], track.time[-1]) == (facts["first_s"], facts["last_s"])
+        for row, sample in facts["sample"].items():
+            place = track.position[int(row)] / [DEG, DEG, 1.0]
+            np.testing.assert_allclose(place, sample[1:4], rtol=0.0, atol=1e-9)
+    coarse, row = log.tracks["NAV-PVT"], wanted["NAV-PVT"]["sample"]["0"]
+    assert coarse.velocity is not None
+    assert coarse.position_std is not None
+    np.testing.assert_allclose(coarse.velocity[0], row[5:8], atol=1e-12)
+    np.testing.assert_allclose(coarse.position_std[0], [row[8], row[8], row[9]], atol=1e-12)
+    assert log.utc_of_zero is not None
+    utc = np.datetime64(row[-1].split()[0]).astype("datetime64[s]").astype(float)
+    assert log.utc_of_zero + coarse.time[0] == pytest.approx(utc, abs=0.51)
+
+
+def test_a_receiver_alone_is_no_recording(logs: Path) -> None:
+    with pytest.raises(InputError, match=r"no IMU data; expected at least one file of them beside .*NAV-PVT"):
+        propose([logs / "ubx" / "zed-f9r.ubx"])
+
+
+def run(log: Path, out: Path) -> dict[str, Any]:
+    done = CliRunner().invoke(cli.cli, ["run", str(log), "--json", "--no-report", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def test_one_command_from_a_log_of_px4_to_a_result(logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "ulog" / "small.ulg", tmp_path)
+    assert summary["verdict"]["level"] == "trust"
+    assert summary["coverage"]["of_recording"] > 0.95
+    assert "sensor of heading" in summary["start"]["heading"]
+    assert any("vehicle_imu[2] is not used: 2 Hz" in text for text in summary["warnings"])
+    assert (tmp_path / "solution.parquet").is_file()
+
+
+def test_one_command_from_a_log_of_ardupilot_to_a_result(logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "dataflash" / "sample.bin", tmp_path)
+    assert summary["imus"] == 2
+    assert summary["verdict"]["level"] in ("trust", "doubt")
+    assert any("no IMU has data for 627.9 s" in text for text in summary["warnings"])
+    assert any("heights of the solution are above the sea" in text for text in summary["warnings"])

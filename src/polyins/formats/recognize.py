@@ -84,11 +84,11 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("ros1-bag", "ROS 1 bag", _begins(b"#ROSBAG V2"), "ros_bag", "rosbags", "ros"),
     LogFormat("ros2-sqlite", "ROS 2 bag (SQLite)", _is_ros2_sqlite, "ros_bag", "rosbags", "ros"),
     LogFormat("mcap", "MCAP of ROS 2", _begins(b"\x89MCAP0\r\n"), "ros_bag", "rosbags", "ros"),
+    LogFormat("ubx", "u-blox UBX", _has_ubx, "ublox", "pyubx2", "ubx"),
 )
 
 NOT_READ: dict[str, Callable[[bytes], bool]] = {
     "SQLite": _begins(b"SQLite format 3\0"),
-    "u-blox UBX": _has_ubx,
     "NMEA 0183": _has_nmea,
     "MATLAB or HDF5": _begins(b"MATLAB 5.0", b"\x89HDF\r\n\x1a\n"),
     "MIMU4444": _has_mimu4444,
