@@ -38,8 +38,10 @@ def test_every_format_has_its_reader_and_its_extra() -> None:
     extras = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     for log in LOGS:
         assert find_spec(f"polyins.formats.{log.reader}") is not None
-        assert any(entry.startswith(log.library) for entry in extras[log.extra])
-        assert log.extra in extras["logs"][0]
+        assert bool(log.library) == bool(log.extra)
+        if log.library:
+            assert any(entry.startswith(log.library) for entry in extras[log.extra])
+            assert log.extra in extras["logs"][0]
     assert "logs" in " ".join(extras["test"])
 
 

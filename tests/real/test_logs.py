@@ -276,3 +276,19 @@ def test_one_command_from_a_log_of_ardupilot_to_a_result(logs: Path, tmp_path: P
     assert summary["verdict"]["level"] in ("trust", "doubt")
     assert any("no IMU has data for 627.9 s" in text for text in summary["warnings"])
     assert any("heights of the solution are above the sea" in text for text in summary["warnings"])
+
+
+@pytest.mark.parametrize(("name", "day"), [("boat", "2018-08-20"), ("m9n", "2020-07-11")])
+def test_positions_of_nmea(name: str, day: str, logs: Path, expected: dict[str, Any]) -> None:
+    track, wanted = read_log(logs / "nmea" / f"{name}.nmea").tracks["GGA"], expected[f"nmea/{name}.nmea"]["gnss"]
+    midnight = np.datetime64(day, "s").astype(float)
+    assert len(track.time) == wanted["GGA"]["rows_3d_fix"]
+    for row, sample in wanted["GGA"]["sample"].items():
+        at = int(row)
+        assert track.time[at] - midnight == sample[0]
+        np.testing.assert_allclose(track.position[at, :2] / DEG, sample[1:3], rtol=0.0, atol=1e-9)
+        assert track.position[at, 2] == pytest.approx(sample[3] + sample[4], abs=1e-9)
+    if "GST" in wanted:
+        np.testing.assert_array_equal(track.position_std[30], wanted["GST"]["sample"]["30"][1:])
+    else:
+        assert track.position_std is None

@@ -74,7 +74,7 @@ class LogFormat:
     reader: str
     """the module of this package whose `read` returns the `Log` of a path"""
     library: str
-    """it is read with, which the extra installs"""
+    """it is read with, which the extra installs; empty: polyins alone reads it"""
     extra: str
 
 
@@ -85,11 +85,11 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("ros2-sqlite", "ROS 2 bag (SQLite)", _is_ros2_sqlite, "ros_bag", "rosbags", "ros"),
     LogFormat("mcap", "MCAP of ROS 2", _begins(b"\x89MCAP0\r\n"), "ros_bag", "rosbags", "ros"),
     LogFormat("ubx", "u-blox UBX", _has_ubx, "ublox", "pyubx2", "ubx"),
+    LogFormat("nmea", "NMEA 0183", _has_nmea, "nmea_log", "", ""),
 )
 
 NOT_READ: dict[str, Callable[[bytes], bool]] = {
     "SQLite": _begins(b"SQLite format 3\0"),
-    "NMEA 0183": _has_nmea,
     "MATLAB or HDF5": _begins(b"MATLAB 5.0", b"\x89HDF\r\n\x1a\n"),
     "MIMU4444": _has_mimu4444,
     "a zip archive": _begins(b"PK\x03\x04"),
