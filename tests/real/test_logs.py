@@ -166,6 +166,12 @@ def test_random_bytes_are_refused(name: str, logs: Path) -> None:
         inspect(logs / "cases" / "unknown-binary" / f"{name}.bin")
 
 
+@pytest.mark.parametrize("name", ["static-120s", "turns-80s"])
+def test_an_array_of_bytes_is_refused_by_name(name: str, logs: Path) -> None:
+    with pytest.raises(InputError, match="looks like MIMU4444, which is not read"):
+        inspect(logs / "array-binary" / f"{name}.bin")
+
+
 @pytest.mark.parametrize("name", ["headerless-7/imu.csv", "numeric-11/imu.csv"])
 def test_numbers_without_header_are_not_taken_for_kf_gins(name: str, logs: Path) -> None:
     assert data_format(logs / "cases" / name) == "table"
