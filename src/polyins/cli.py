@@ -164,8 +164,9 @@ def _open(settings: Settings) -> Recording | LongRecording:
     """Read a recording, or open its files if it is longer than memory."""
     from polyins.reading.loading import load_settings
     from polyins.reading.long_recording import open_long
+    from polyins.tools.propose import doubted
 
-    return open_long(settings) or load_settings(settings)
+    return doubted(open_long(settings) or load_settings(settings), settings[2])
 
 
 def _exit_by(levels: list[Level]) -> None:

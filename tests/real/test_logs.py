@@ -276,6 +276,16 @@ def test_one_command_from_a_log_of_px4_to_a_result(logs: Path, tmp_path: Path) -
     assert (tmp_path / "solution.parquet").is_file()
 
 
+def test_a_forward_axis_that_nothing_tells_is_doubted(logs: Path, tmp_path: Path) -> None:
+    common = logs / "cases" / "common"
+    inputs = [str(common / name) for name in ("imu.csv", "gnss.csv")]
+    done = CliRunner().invoke(cli.cli, ["run", *inputs, "--json", "--no-report", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    verdict = json.loads(done.stdout)["verdict"]
+    assert verdict["level"] == "doubt"
+    assert ["forward is a guess" in one["text"] for one in verdict["findings"] if one["severity"] == "doubt"] == [True]
+
+
 def test_one_command_from_a_log_of_ardupilot_to_a_result(logs: Path, tmp_path: Path) -> None:
     summary = run(logs / "dataflash" / "sample.bin", tmp_path)
     assert summary["imus"] == 2

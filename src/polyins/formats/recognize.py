@@ -58,7 +58,7 @@ def _has_nmea(head: bytes) -> bool:
 
 
 def _has_mimu4444(head: bytes) -> bool:
-    """Whether two packets follow each other near the beginning, each of 106 bytes: aa, a number of two bytes, 64 (hexadecimal)."""
+    """Whether two packets of 106 bytes follow each other near the beginning: aa, a number, hexadecimal 64."""
     marks = b"\xaa\x64\xaa\x64"
     return any(bytes(head[k + n] for n in (0, 3, 106, 109)) == marks for k in range(8) if len(head) > k + 109)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,13 @@ from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
-from polyins.model.recording import usual_interval
+from polyins.model.findings import Finding
+from polyins.model.recording import Recording, usual_interval
 from polyins.model.rig import DEG, HOUR
 from polyins.reading import loading
 from polyins.reading.guess import guess_columns, read_stream
 from polyins.reading.loading import Settings
+from polyins.reading.long_recording import LongRecording
 from polyins.tools.inspect import describe
 
 CHECK = "# CHECK:"
@@ -33,6 +35,9 @@ FEWEST_SHAKEN = 100
 MEDIAN_TO_STD = 1.4826
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
+FORWARD_IS_A_GUESS = "forward is a guess"
+LEAST_CORRELATION = 0.3
+"""of a horizontal axis with the acceleration of the speed, to take it for forward"""
 FEWEST_MEANS = 20
 """of a second, to tell which axis points forward"""
 HEADING_RATE_HZ = 1.0
@@ -106,6 +111,16 @@ def settings_of(paths: Sequence[Path]) -> Settings:
     text = propose([find(path).resolve() for path in paths])
     document = as_document(find(paths[0]), text)
     return loading.located(document), Document(document.path, document.values), tuple(assumptions(text))
+
+
+def doubted(recording: Recording | LongRecording, assumed: Sequence[str]) -> Recording | LongRecording:
+    """Return a recording with a doubt for each assumption that would turn the heading if it were wrong."""
+    remedy = "give axes in a configuration (polyins init writes one)"
+    guesses = tuple(Finding("mount", text, "doubt", remedy=remedy) for text in assumed if FORWARD_IS_A_GUESS in text)
+    if isinstance(recording, LongRecording):
+        head = recording.head
+        return replace(recording, head=replace(head, findings=(*head.findings, *guesses)))
+    return replace(recording, findings=(*recording.findings, *guesses))
 
 
 def assumptions(proposal: str) -> list[str]:
@@ -218,10 +233,11 @@ def _axes_lines(imu: Source, facts: dict[str, Any], speeds: list[Source]) -> lis
     force = np.array(facts["accel_mean_m_s2"] or [0.0, 0.0, -9.8], dtype=float)
     axes = upright_axes(("x", "y", "z"), force)
     mean = ", ".join(f"{value:.1f}" for value in force)
-    forward = "forward is a guess"
+    forward = FORWARD_IS_A_GUESS
     if speeds and isinstance(imu.rows, ImuRows) and isinstance(speeds[0].rows, SensorRows):
-        axes, correlation = forward_axes(axes, imu.rows, speeds[0].rows)
-        forward = f"forward feels what {speeds[0].stream} accelerates, correlation {correlation:.2f}"
+        told, correlation = forward_axes(axes, imu.rows, speeds[0].rows)
+        if correlation > LEAST_CORRELATION:
+            axes, forward = told, f"forward feels what {speeds[0].stream} accelerates, correlation {correlation:.2f}"
     return [
         f"    # at rest or on average the sensor feels [{mean}] m/s^2, so down is known",
         f"    axes: [{', '.join(axes)}]  {CHECK} sensor axes that point forward, right, down; {forward}",
