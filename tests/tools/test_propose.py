@@ -126,6 +126,7 @@ def test_the_axis_that_goes_with_the_speed_is_forward() -> None:
     speed = SensorRows(RowSource("log"), "odometer", time[::5], 3.0 * np.sin(0.3 * time[::5]))
     ahead = 0.9 * np.cos(0.3 * time)
     force = np.column_stack([0.3 * np.sin(time), np.full(3000, 9.8), -ahead])
-    axes, agreement = forward_axes(("x", "z", "-y"), logged(time, force), speed)
+    axes, agreement, sigmas = forward_axes(("x", "z", "-y"), logged(time, force), speed)
     assert axes == ("-z", "x", "-y")
     assert agreement > 0.9
+    assert sigmas > 4.0

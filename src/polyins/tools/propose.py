@@ -36,8 +36,8 @@ MEDIAN_TO_STD = 1.4826
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
 FORWARD_IS_A_GUESS = "forward is a guess"
-LEAST_CORRELATION = 0.3
-"""of a horizontal axis with the acceleration of the speed, to take it for forward"""
+LEAST_SIGMAS = 4.0
+"""of what chance makes, by which a horizontal axis agrees with the acceleration of the speed if it is forward"""
 FEWEST_MEANS = 20
 """of a second, to tell which axis points forward"""
 HEADING_RATE_HZ = 1.0
@@ -235,9 +235,9 @@ def _axes_lines(imu: Source, facts: dict[str, Any], speeds: list[Source]) -> lis
     mean = ", ".join(f"{value:.1f}" for value in force)
     forward = FORWARD_IS_A_GUESS
     if speeds and isinstance(imu.rows, ImuRows) and isinstance(speeds[0].rows, SensorRows):
-        told, correlation = forward_axes(axes, imu.rows, speeds[0].rows)
-        if correlation > LEAST_CORRELATION:
-            axes, forward = told, f"forward feels what {speeds[0].stream} accelerates, correlation {correlation:.2f}"
+        axes, correlation, sigmas = forward_axes(axes, imu.rows, speeds[0].rows)
+        if sigmas > LEAST_SIGMAS:
+            forward = f"forward feels what {speeds[0].stream} accelerates, correlation {correlation:.2f}"
     return [
         f"    # at rest or on average the sensor feels [{mean}] m/s^2, so down is known",
         f"    axes: [{', '.join(axes)}]  {CHECK} sensor axes that point forward, right, down; {forward}",
@@ -245,14 +245,15 @@ def _axes_lines(imu: Source, facts: dict[str, Any], speeds: list[Source]) -> lis
     ]
 
 
-def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, float]:
-    """Return the axes of the same down whose forward force goes with the acceleration of the speed; and how much so.
+def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, float, float]:
+    """Return the axes of the same down whose forward force goes best with the acceleration of the speed.
 
-    Both are means over a second or more, in which tilt and vibration count little.
+    Returns their correlation as well, and how many times it is what chance makes of so many means. Both are means over
+    a second, in which tilt and vibration count little.
     """
     ends = np.arange(max(rows.time[0], speed.time[0]) + 1.0, min(rows.time[-1], speed.time[-1]), 1.0)
     if len(ends) < FEWEST_MEANS:
-        return axes, 0.0
+        return axes, 0.0, 0.0
     gained = np.diff(np.interp(ends, speed.time, speed.value))
     sums = np.column_stack([np.interp(ends, rows.time, total) for total in np.nancumsum(rows.dvel, axis=0).T])
     felt = np.diff(sums, axis=0)
@@ -262,7 +263,8 @@ def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, fl
     agreement = (felt * gained[:, None]).sum(axis=0) / np.where(size > 0.0, size, np.inf)
     candidates = [one for one in right_handed_axes() if one[2] == axes[2]]
     best = max(candidates, key=lambda one: float(axes_matrix(one)[0] @ agreement))
-    return best, float(axes_matrix(best)[0] @ agreement)
+    correlation = float(axes_matrix(best)[0] @ agreement)
+    return best, correlation, correlation * float(np.sqrt(len(gained)))
 
 
 def _odometer_lines(of: Source) -> list[str]:
