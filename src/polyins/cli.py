@@ -102,11 +102,11 @@ def demo(out: Path) -> None:
     with progress("simulating"):
         config = files.write(drive(scenario()), out / "recording")
     say(f"recording: {config}")
-    _compare(config, None, Files(out), as_json=False, no_report=False, judged=False)
+    _compare((config,), None, Files(out), as_json=False, no_report=False, judged=False)
 
 
 @cli.command()
-@click.argument("config", type=FILE)
+@click.argument("inputs", metavar="CONFIG|LOG...", type=FILE, nargs=-1, required=True)
 @click.option(
     "--method",
     default=None,
@@ -116,10 +116,11 @@ def demo(out: Path) -> None:
 @out_option("polyins-out")
 @as_json_option
 @no_report_option
-def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool) -> None:
-    """Run one method over one recording (polyins YAML, or a KF-GINS or Wheel-INS configuration)."""
+def run(
+    inputs: tuple[Path, ...], method: str | None, imu: str | None, out: Path, as_json: bool, no_report: bool
+) -> None:
+    """Run one method over one recording: a configuration (polyins, KF-GINS, Wheel-INS), or the logs that hold it."""
     from polyins.model.methods import find_method
-    from polyins.reading import loading
     from polyins.tools import navigation, results
 
     gc.set_threshold(COLLECT_AFTER)
@@ -128,7 +129,7 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     if imu is not None and method not in (None, "single"):
         raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
     with progress("reading"):
-        recording = _open(loading.read_config(config))
+        recording = _open(_settings(inputs))
     known = navigation.head(recording)
     if imu is not None and known.rig.has_wheels:
         raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
@@ -149,12 +150,23 @@ def run(config: Path, method: str | None, imu: str | None, out: Path, as_json: b
     _exit_by([summary["verdict"]["level"]])
 
 
+def _settings(inputs: tuple[Path, ...]) -> Settings:
+    """Read a configuration, or propose one for logs; what it assumes are warnings."""
+    from polyins.reading.loading import read_config
+    from polyins.tools.propose import are_logs, settings_of
+
+    if not are_logs(inputs):
+        return read_config(inputs[0])
+    return settings_of(inputs)
+
+
 def _open(settings: Settings) -> Recording | LongRecording:
     """Read a recording, or open its files if it is longer than memory."""
     from polyins.reading.loading import load_settings
     from polyins.reading.long_recording import open_long
+    from polyins.tools.propose import doubted
 
-    return open_long(settings) or load_settings(settings)
+    return doubted(open_long(settings) or load_settings(settings), settings[2])
 
 
 def _exit_by(levels: list[Level]) -> None:
@@ -186,7 +198,7 @@ def _imu_index(names: list[str], wanted: str | None) -> int:
 
 
 @cli.command()
-@click.argument("configs", metavar="CONFIG [CONFIG ...]", type=FILE, nargs=-1, required=True)
+@click.argument("inputs", metavar="CONFIG|LOG...", type=FILE, nargs=-1, required=True)
 @click.option("--methods", default=None, help="Names separated by commas; unless given all that the rig allows.")
 @click.option("--threads", type=click.IntRange(1), default=None, help="Runs at once; one for each core unless given.")
 @click.option(
@@ -199,22 +211,23 @@ def _imu_index(names: list[str], wanted: str | None) -> int:
 @out_option("polyins-out")
 @as_json_option
 @no_report_option
-def compare(configs: tuple[Path, ...], methods: str | None, single_rate: float, out: Path, **options: Any) -> None:
-    """Run several methods over one recording or more, and each IMU on its own."""
+def compare(inputs: tuple[Path, ...], methods: str | None, single_rate: float, out: Path, **options: Any) -> None:
+    """Run several methods over one recording or more, and each IMU on its own; logs make one recording together."""
     from polyins.model.methods import find_method
     from polyins.tools.comparison import Files
+    from polyins.tools.propose import are_logs
 
     gc.set_threshold(COLLECT_AFTER)
     names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else None
     files = Files(out, single_rate or None)
-    if len(configs) > 1:
-        _compare_several(configs, names, files, **options)
+    if len(inputs) > 1 and not are_logs(inputs):
+        _compare_several(inputs, names, files, **options)
     else:
-        _compare(configs[0], names, files, **options)
+        _compare(inputs, names, files, **options)
 
 
 def _compare(
-    config: Path,
+    inputs: tuple[Path, ...],
     methods: list[str] | None,
     files: Files,
     as_json: bool,
@@ -222,13 +235,12 @@ def _compare(
     threads: int | None = None,
     judged: bool = True,
 ) -> None:
-    from polyins.reading.loading import read_config
     from polyins.tools import navigation, results
     from polyins.tools.comparison import compare as run_all
 
     out = files.folder
     with progress("reading"):
-        recording = _open(read_config(config))
+        recording = _open(_settings(inputs))
     make_folder(out)
     with compilation_said(), progress("compare") as update:
         result = run_all(recording, methods, files=files, threads=threads, progress=update)
@@ -518,13 +530,13 @@ def dataset_configuration(name: str, gnss: bool) -> None:
 
 
 @cli.command()
-@click.argument("file", type=FILE)
+@click.argument("files", metavar="FILE...", type=FILE, nargs=-1, required=True)
 @as_json_option
-def info(file: Path, as_json: bool) -> None:
-    """Say what is in a data file or configuration: streams, rates, gaps, span."""
+def info(files: tuple[Path, ...], as_json: bool) -> None:
+    """Say what is in data files or configurations: streams, rates, gaps, span."""
     from polyins.tools.inspect import inspect, listing
 
-    facts = inspect(file)
+    facts = inspect(files[0]) if len(files) == 1 else {"files": [inspect(file) for file in files]}
     if as_json:
         _print_json(facts)
     else:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from polyins.errors import InputError
+from polyins.formats.recognize import data_format
 from polyins.formats.rtklib import read_gnss
 from polyins.model.rig import DEG
 from polyins.reading.loading import load
@@ -86,13 +87,11 @@ def test_positions_that_are_not_fixed_are_counted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("latitude(deg) longitude(deg)  height(m)", "x-ecef(m) y-ecef(m) z-ecef(m)", "positions are ECEF"),
         (
             "latitude(deg) longitude(deg)  height(m)",
             "e-baseline(m) n-baseline(m) u-baseline(m)",
             "positions are baselines",
         ),
-        ("latitude(deg)", "latitude(d'\")", "positions are degrees and minutes"),
         ("34.955962416", "34.9559x2416", r"line 6: .*; expected a row of numbers"),
         ("   1.00  999.9", "", "line 6: 15 values; expected 17 as before|line 7"),
     ],
@@ -123,3 +122,44 @@ def test_heights_above_the_sea_must_be_configured(tmp_path: Path) -> None:
     recording = load(write_config(tmp_path, values))
     assert recording.gnss is not None
     np.testing.assert_allclose(recording.gnss.position[:, 2], 45.1)
+
+
+def test_jst_is_nine_hours_ahead_of_utc(tmp_path: Path) -> None:
+    jst = read_gnss(write(tmp_path / "a.pos", ["2022/07/07 17:10:44.000"], "JST"))
+    utc = read_gnss(write(tmp_path / "b.pos", ["2022/07/07 08:10:44.000"], "UTC"))
+    assert jst.time[0] == utc.time[0]
+
+
+def test_degrees_minutes_and_seconds(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.pos", ["2217 1.0", "2217 2.0"])
+    text = path.read_text().replace("latitude(deg) longitude(deg)", "latitude(d'\") longitude(d'\")")
+    path.write_text(text.replace("32.825683159   34.955962416", "-0 30 36.00000   34 57 21.46470"))
+    track = read_gnss(path)
+    np.testing.assert_allclose(track.position[1] / DEG, [-0.51, 34.955962417, 28.1 / DEG], atol=1e-9)
+    np.testing.assert_allclose(track.position_std, [[0.01, 0.02, 0.03]] * 2)
+
+
+def test_ecef_is_turned_to_north_east_down(tmp_path: Path) -> None:
+    # on the equator at 90 deg east: x points west, y up, z north
+    more = (" vx(m/s) vy(m/s) vz(m/s) sdvx sdvy sdvz sdvxy sdvyz sdvzx", " 1.0 2.0 3.0 0.1 0.2 0.3 0 0 0")
+    path = write(tmp_path / "a.pos", ["2217 1.0"], more=more)
+    text = path.read_text().replace("latitude(deg) longitude(deg)  height(m)", "x-ecef(m) y-ecef(m) z-ecef(m)")
+    text = text.replace(
+        "sdn(m)   sde(m)   sdu(m)  sdne(m)  sdeu(m)  sdun(m)", "sdx(m) sdy(m) sdz(m) sdxy(m) sdyz(m) sdzx(m)"
+    )
+    text = text.replace("32.825683159   34.955962416    28.1000", "0.0 6378147.0 0.0")
+    path.write_text(text.replace("0.0010   0.0020   0.0030", "0 0 0"))
+    track = read_gnss(path)
+    np.testing.assert_allclose(track.position, [[0.0, np.pi / 2, 10.0]], atol=1e-8)
+    np.testing.assert_allclose(track.velocity, [[3.0, -1.0, -2.0]], atol=1e-12)
+    np.testing.assert_allclose(track.position_std, [[0.03, 0.01, 0.02]], atol=1e-12)
+    np.testing.assert_allclose(track.velocity_std, [[0.3, 0.1, 0.2]], atol=1e-12)
+
+
+def test_without_a_header_the_clock_is_said_to_be_unknown(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.pos", ["2022/07/07 08:11:02.000", "2022/07/07 08:11:02.200"])
+    path.write_text("\n".join(line for line in path.read_text().splitlines() if line[:1] != "%") + "\n")
+    assert data_format(path) == "rtklib-pos"
+    track = read_gnss(path)
+    assert track.time[0] == 375062.0
+    assert "no header" in track.warnings[0]

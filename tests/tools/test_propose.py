@@ -9,8 +9,9 @@ import pytest
 from written_recordings import as_increments, fixes, still_imu, write_recording, write_rows
 
 from polyins.errors import InputError
+from polyins.formats.rows import ImuRows, RowSource, SensorRows
 from polyins.reading.loading import load
-from polyins.tools.propose import propose
+from polyins.tools.propose import forward_axes, propose, shaking
 
 
 def save(folder: Path, text: str) -> Path:
@@ -103,3 +104,29 @@ def test_a_real_flight_loads_right_away(data_folder: Path, tmp_path: Path) -> No
     assert len(recording.imus) == 4
     assert recording.gnss is not None
     assert text.count("axes: [x, -y, -z]") == 4
+
+
+def test_what_shakes_is_the_random_walk() -> None:
+    rng = np.random.default_rng(6)
+    time, walks = np.arange(4000) / 100.0, (2e-3, 0.05)
+    swing = 0.05 * np.sin(time)[:, None] * [1.0, 0.5, 0.2]  # of a vehicle that turns and accelerates
+    angle, velocity = (swing * 0.01 + walk * 0.1 * rng.normal(size=(4000, 3)) for walk in walks)
+    rows = ImuRows(RowSource("a"), time, angle, velocity)
+    assert shaking(rows) == pytest.approx(walks, rel=0.1)
+    still = ImuRows(RowSource("a"), time, swing * 0.01, swing * 0.01)
+    assert max(shaking(still)) < 1e-6
+
+
+def logged(time: np.ndarray, force: np.ndarray) -> ImuRows:
+    return ImuRows(RowSource("log"), time, np.zeros_like(force), np.diff(time, prepend=-0.02)[:, None] * force)
+
+
+def test_the_axis_that_goes_with_the_speed_is_forward() -> None:
+    time = np.arange(3000) / 50.0
+    speed = SensorRows(RowSource("log"), "odometer", time[::5], 3.0 * np.sin(0.3 * time[::5]))
+    ahead = 0.9 * np.cos(0.3 * time)
+    force = np.column_stack([0.3 * np.sin(time), np.full(3000, 9.8), -ahead])
+    axes, agreement, sigmas = forward_axes(("x", "z", "-y"), logged(time, force), speed)
+    assert axes == ("-z", "x", "-y")
+    assert agreement > 0.9
+    assert sigmas > 4.0

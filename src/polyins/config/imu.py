@@ -178,6 +178,8 @@ class ImuEntry(ImuSettings):
 
     name: str = ""
     """a name of its own; imu1, imu2, ... if not given"""
+    stream: str = ""
+    """which of the IMUs of a log; may be left out where there is only one"""
     file: str = ""
     """where its data are; `polyins live` needs it for a replay only, all else always"""
 

@@ -26,6 +26,8 @@ class GnssEntry(Section):
 
     file: str = ""
     """where the data are; `polyins live` needs it for a replay only, all else always"""
+    stream: str = ""
+    """which stream of a log; may be left out where there is only one of the kind"""
     format: Literal["auto", "kf-gins", "rtklib-pos", "table"] = "auto"
     """of the file; auto: found from its content"""
     columns: TrackColumns | None = None
@@ -40,8 +42,8 @@ class GnssEntry(Section):
     """north, east, down, m; takes the place of what the file says; the larger, the less fixes weigh"""
     rate_hz: Positive | None = None
     """thin the fixes to this rate; the larger, the more of them are used"""
-    height: Literal["ellipsoidal", "sea-level"] = "ellipsoidal"
-    """what heights count from"""
+    height: Literal["ellipsoidal", "sea-level", "as-given"] = "ellipsoidal"
+    """what heights count from; as-given: whatever it is, and so do those of the solution"""
     geoid_height_m: Number | None = None
     """height of the geoid above the ellipsoid, m; needed with sea-level heights"""
     plane_origin: GeodeticPoint | None = None
@@ -53,6 +55,8 @@ class ReferenceEntry(Section):
 
     file: str
     """where the data are"""
+    stream: str = ""
+    """which stream of a log; may be left out where there is only one of the kind"""
     format: Literal["auto", "kf-gins-nav", "kf-gins", "rtklib-pos", "table"] = "auto"
     """of the file; auto: found from its content"""
     columns: TrackColumns | None = None
@@ -63,7 +67,7 @@ class ReferenceEntry(Section):
     """position and velocity belong to an instant that much later than the attitude of the same row, s"""
     point_m: Triple = ORIGIN
     """the point that the positions describe, from the array's origin: forward, right, down, m"""
-    height: Literal["ellipsoidal", "sea-level"] = "ellipsoidal"
-    """what heights count from"""
+    height: Literal["ellipsoidal", "sea-level", "as-given"] = "ellipsoidal"
+    """what heights count from; as-given: whatever it is, and so do those of the solution"""
     geoid_height_m: Number | None = None
     """height of the geoid above the ellipsoid, m; needed with sea-level heights"""

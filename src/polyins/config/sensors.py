@@ -27,10 +27,14 @@ class SensorEntry(Section):
 
     file: str = ""
     """where the data are; `polyins live` needs it for a replay only"""
+    stream: str = ""
+    """which stream of a log; may be left out where there is only one of the kind"""
     columns: SensorColumns | None = None
     """of the table; without it time_s and height_m, heading_deg or speed_m_s"""
     clock_offset_s: Number = 0.0
     """added to the stamps, s; the larger, the later the values count"""
+    rate_hz: Positive | None = None
+    """thin the values to this rate; the larger, the more of them are used, as if their errors were independent"""
     position_m: Triple = ORIGIN
     """the point whose height or velocity it shows, from the array's origin: forward, right, down, m"""
 

@@ -60,11 +60,16 @@ def read_yaml(path: str | Path) -> Document:
     Raises InputError with the line for anything else, except for a key that is given twice: `Document.duplicate`
     says so and the reader of the configuration decides.
     """
+    return as_document(find(path), read_text(path))
+
+
+def as_document(found: Path, text: str) -> Document:
+    """Return what a text of YAML holds, whose names count from the folder of `found`; raises as `read_yaml` does."""
     from ruamel.yaml import YAML
     from ruamel.yaml.constructor import DuplicateKeyError
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-    found, text, duplicate = find(path), read_text(path), ""
+    duplicate = ""
     try:
         try:
             tree = YAML().load(text)

@@ -17,6 +17,7 @@ from polyins.formats.arrow_arrays import to_numpy
 from polyins.formats.columns import HEAD_BYTES, PIECE_ROWS, Column
 from polyins.formats.columns import read_in_order as read_text_in_order
 from polyins.formats.rows import ImuRows, RowSource, Track, intervals
+from polyins.model.geodesy import displacement
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG
 
@@ -25,6 +26,15 @@ if TYPE_CHECKING:
 
 IMU_COLUMNS = 7
 ROW_BYTES = 8 * IMU_COLUMNS
+LARGEST_STAMP = 1e10
+SMALLEST_STAMP = 1e-9
+"""s, but for zero"""
+LARGEST_VALUE = 1e4
+"""of an increment or a rate, m/s^2 at most"""
+CLEARLY = 0.8
+"""of two differences the smaller is that part of the larger one at most"""
+MOSTLY = 0.8
+"""of the rows, where some are damaged"""
 IMU_FORMATS = ("%.9f", *6 * ["%.12e"])
 
 
@@ -82,7 +92,9 @@ def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[
 def read_gnss(path: str | Path) -> Track:
     """Read positions: s, latitude, longitude (deg), height (m), std north, east, down (m).
 
-    With 13 columns the velocity (north, east, down, m/s) stands before the position's std and its std after it.
+    With 13 columns the velocity (north, east, down, m/s) stands before the position's std and its std after it, or, as
+    KF-GINS-Matlab has it, behind that std: the values tell which, and a warning says so. Raises InputError if they do
+    not.
     """
     wanted = {
         7: "s, latitude deg, longitude deg, height m, std m",
@@ -92,14 +104,38 @@ def read_gnss(path: str | Path) -> Track:
     source = RowSource(str(find(path)), 1)
     if rows.shape[1] == 7:
         return Track(source, rows[:, 0], _radians(rows[:, 1:4], 2), position_std=rows[:, 4:7])
+    velocity, std = slice(4, 7), slice(7, 10)
+    matlab = _std_first(source, rows)
+    if matlab:
+        velocity, std = std, velocity
     return Track(
         source,
         rows[:, 0],
         _radians(rows[:, 1:4], 2),
-        position_std=rows[:, 7:10],
-        velocity=rows[:, 4:7],
+        position_std=rows[:, std],
+        velocity=rows[:, velocity],
         velocity_std=rows[:, 10:13],
+        warnings=(f"{source.path}: columns 5 to 7 are taken as std and 8 to 10 as velocity",) if matlab else (),
     )
+
+
+def _std_first(source: RowSource, rows: Array) -> bool:
+    """Whether columns 5 to 7 are the std and 8 to 10 the velocity: a std is above zero, a velocity moves."""
+    no_std = [bool((rows[:, k : k + 3] <= 0.0).any()) for k in (4, 7)]
+    if no_std[0] != no_std[1]:
+        return no_std[1]
+    if all(no_std) or len(rows) < 2:
+        return False  # whatever is wrong with a std is said of the order that KF-GINS documents
+    moved = displacement(_radians(rows[:, 1:4], 2), _radians(rows[:1, 1:4], 2)[0], True)
+    rates = np.diff(moved, axis=0) / np.diff(rows[:, 0])[:, None]
+    with np.errstate(invalid="ignore"):
+        apart = [float(np.nanmedian(np.abs(rates - rows[1:, k : k + 3]).sum(axis=1))) for k in (4, 7)]
+    if min(apart) > CLEARLY * max(apart):
+        raise InputError(
+            f"{source.path}: columns 5 to 7 or 8 to 10 may be the velocity, the others the std; expected values that "
+            "tell, or a table with its columns declared"
+        )
+    return apart[1] < apart[0]
 
 
 def read_nav(path: str | Path) -> Track:
@@ -139,6 +175,17 @@ def write_gnss(path: str | Path, stream: GnssStream) -> None:
 def is_text(content: bytes) -> bool:
     """Tell text, of whatever encoding, from binary by the first bytes: it has no control characters but blanks."""
     return all(byte in b"\t\n\r\f" or byte >= 32 for byte in content[:512])
+
+
+def are_rows(head: bytes) -> bool:
+    """Tell rows of doubles, of increments or rates, from any other binary by the first bytes: stamps rise."""
+    rows = np.frombuffer(head[: len(head) // ROW_BYTES * ROW_BYTES], "<f8").reshape(-1, IMU_COLUMNS)
+    with np.errstate(invalid="ignore", over="ignore"):
+        size = np.abs(rows[:, 1:]).max(axis=1, initial=0.0)
+        known = (rows[:, 0] == 0.0) | (np.abs(rows[:, 0]) > SMALLEST_STAMP)
+        likely = (size < LARGEST_VALUE) & known & (np.abs(rows[:, 0]) < LARGEST_STAMP)
+        rising = np.diff(rows[:, 0]) > 0.0
+    return bool(len(rows)) and likely.mean() > MOSTLY and (len(rows) < 2 or bool(rising.mean() > MOSTLY))
 
 
 def _radians(rows: Array, columns: int) -> Array:

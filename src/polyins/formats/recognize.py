@@ -1,67 +1,232 @@
-"""Which format a file has, told by its content."""
+"""Which format a file has, told by its content; the table of logs, and of what is known and not read."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
+
+import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_head
 from polyins.formats import kf_gins
 from polyins.formats.columns import PARQUET_MAGIC
+from polyins.formats.log import Log
+from polyins.formats.rtklib import has_rows
+from polyins.model.recording import Array
 
 HEAD_BYTES = 16384
+MOST_ROWS = 100
+"""without a header that are looked at"""
+LONGEST_UBX = 4096
+FEW_ROWS = 4
+"""tell nothing of stamps"""
+MOSTLY = 0.8
+"""of the steps between stamps are forward"""
+
+
+def _begins(*signatures: bytes) -> Callable[[bytes], bool]:
+    return lambda head: head.startswith(signatures)
+
+
+def _is_ros2_sqlite(head: bytes) -> bool:
+    """Whether a database has the tables of a ROS 2 bag: their text stands on the first page."""
+    return head.startswith(b"SQLite format 3\0") and b"serialization_format" in head
+
+
+def _has_ubx(head: bytes) -> bool:
+    """Whether there is a whole message of UBX, by its checksum."""
+    at = head.find(b"\xb5\x62")
+    while at >= 0:
+        end = at + 6 + int.from_bytes(head[at + 4 : at + 6], "little")
+        a = b = 0
+        for byte in head[at + 2 : end] if end - at < LONGEST_UBX else b"":
+            a = (a + byte) & 0xFF
+            b = (b + a) & 0xFF
+        if end - at < LONGEST_UBX and head[end : end + 2] == bytes([a, b]):
+            return True
+        at = head.find(b"\xb5\x62", at + 2)
+    return False
+
+
+def _has_nmea(head: bytes) -> bool:
+    return any(re.fullmatch(rb"\$[A-Z]{4,6},[ -~]*\*[0-9A-F]{2}", line.strip()) for line in head.splitlines())
+
+
+def _has_mimu4444(head: bytes) -> bool:
+    """Whether two packets of 106 bytes follow each other near the beginning: aa, a number, hexadecimal 64."""
+    marks = b"\xaa\x64\xaa\x64"
+    return any(bytes(head[k + n] for n in (0, 3, 106, 109)) == marks for k in range(8) if len(head) > k + 109)
+
+
+@dataclass(frozen=True)
+class LogFormat:
+    """A format whose files hold several streams."""
+
+    name: str
+    title: str
+    fits: Callable[[bytes], bool]
+    """whether a file that begins like this has it"""
+    reader: str
+    """the module of this package whose `read` returns the `Log` of a path"""
+    library: str
+    """it is read with, which the extra installs; empty: polyins alone reads it"""
+    extra: str
+
+
+LOGS: tuple[LogFormat, ...] = (
+    LogFormat("px4-ulog", "PX4 ULog", _begins(b"ULog\x01\x12\x35"), "px4_ulog", "pyulog", "px4"),
+    LogFormat("dataflash", "ArduPilot DataFlash", _begins(b"\xa3\x95\x80\x80"), "dataflash", "pymavlink", "ardupilot"),
+    LogFormat("ros1-bag", "ROS 1 bag", _begins(b"#ROSBAG V2"), "ros_bag", "rosbags", "ros"),
+    LogFormat("ros2-sqlite", "ROS 2 bag (SQLite)", _is_ros2_sqlite, "ros_bag", "rosbags", "ros"),
+    LogFormat("mcap", "MCAP of ROS 2", _begins(b"\x89MCAP0\r\n"), "ros_bag", "rosbags", "ros"),
+    LogFormat("ubx", "u-blox UBX", _has_ubx, "ublox", "pyubx2", "ubx"),
+    LogFormat("nmea", "NMEA 0183", _has_nmea, "nmea_log", "", ""),
+)
+
+NOT_READ: dict[str, Callable[[bytes], bool]] = {
+    "SQLite": _begins(b"SQLite format 3\0"),
+    "MATLAB or HDF5": _begins(b"MATLAB 5.0", b"\x89HDF\r\n\x1a\n"),
+    "MIMU4444": _has_mimu4444,
+    "a zip archive": _begins(b"PK\x03\x04"),
+}
+"""what is known and not read, and how it is known"""
 
 
 def data_format(path: str | Path) -> str:
-    """Return xsens-dot, kf-gins (IMU), kf-gins-gnss, kf-gins-nav, rtklib-pos, table or configuration.
+    """Return a name of LOGS, xsens-dot, kf-gins (IMU), kf-gins-gnss, kf-gins-nav, rtklib-pos, table or configuration.
 
     Raises InputError if it is none of them.
     """
     content = read_head(path, HEAD_BYTES)
     if content[:4] == PARQUET_MAGIC:
         return "table"
+    if (log := log_format(path)) is not None:
+        return log.name
+    for title, fits in NOT_READ.items():
+        if fits(content):
+            raise InputError(f"{find(path)}: looks like {title}, which is not read; expected {readable()}")
     if not kf_gins.is_text(content):
-        return "kf-gins"
+        return _binary(path, content)
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
-        return "xsens-dot"
-    if lines[0].startswith("%") and any("latitude" in line for line in lines):
+        return _xsens(path, lines)
+    if (lines[0].startswith("%") and any(re.search("latitude|-ecef|baseline", line) for line in lines)) or has_rows(
+        rows
+    ):
         return "rtklib-pos"
     if any(": " in line or line.endswith(":") for line in rows[:20]):
         return "configuration"
     return _rows_of_numbers(rows) or _table(path, rows)
 
 
+def readable() -> str:
+    """Say what is read."""
+    logs = ", ".join(log.title for log in LOGS)
+    return f"{logs}, KF-GINS, RTKLIB .pos, Xsens DOT, a table (CSV, Parquet) or a configuration"
+
+
+def log_format(path: str | Path) -> LogFormat | None:
+    """Return the format of a log, or None of any other file."""
+    head = read_head(path, HEAD_BYTES)
+    return next((log for log in LOGS if log.fits(head)), None)
+
+
+def read_log(path: str | Path) -> Log:
+    """Read all streams of a log.
+
+    Raises InputError if it is none, is damaged, or the library that reads it is missing.
+    """
+    found = find(path)
+    if found.suffix == ".gz":
+        raise InputError(f"{found}: is packed; expected the log unpacked")
+    state = found.stat()
+    return _read_log(found, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=2)
+def _read_log(path: Path, _changed: int, _size: int) -> Log:
+    """Read a log once for all of its streams, as long as the file stays the same."""
+    known = log_format(path)
+    if known is None:
+        raise InputError(f"{path}: is no log of several streams; expected {', '.join(log.title for log in LOGS)}")
+    log: Log = import_module(f"polyins.formats.{known.reader}").read(path)
+    return log
+
+
 def imu_format(path: str | Path) -> str:
-    """Return the format of a file of IMU data as the configuration names it."""
+    """Return the format of a file of IMU data as the configuration names it, or log."""
     return _one_of(path, {"xsens-dot": "xsens-dot", "kf-gins": "kf-gins", "table": "table"}, "IMU data")
 
 
 def track_format(path: str | Path) -> str:
-    """Return the format of a file of positions as the configuration names it."""
+    """Return the format of a file of positions as the configuration names it, or log."""
     names = {"kf-gins-gnss": "kf-gins", "kf-gins-nav": "kf-gins-nav", "rtklib-pos": "rtklib-pos", "table": "table"}
     return _one_of(path, names, "positions")
 
 
 def _one_of(path: str | Path, names: dict[str, str], what: str) -> str:
     found = data_format(path)
+    names = names | {log.name: "log" for log in LOGS}
     if found not in names:
-        raise InputError(f"{find(path)}: looks like {found}; expected {what} ({', '.join(names.values())})")
+        raise InputError(
+            f"{find(path)}: looks like {found}; expected {what} ({', '.join(dict.fromkeys(names.values()))})"
+        )
     return names[found]
 
 
+def _binary(path: str | Path, head: bytes) -> str:
+    """Tell rows of doubles from anything else, which is refused."""
+    if kf_gins.are_rows(head):
+        return "kf-gins"
+    raise InputError(f"{find(path)}: is of no known binary format; expected {readable()}")
+
+
+def _xsens(path: str | Path, lines: list[str]) -> str:
+    """Tell a DOT's export from that of MT Manager, whose columns have the same names and other units."""
+    header = next(line for line in lines if "Acc_X" in line and "Gyr_X" in line)
+    if lines[0].startswith("//") or "\t" in header:
+        raise InputError(
+            f"{find(path)}: looks like Xsens MT text, in which no units stand; expected a table with its columns "
+            "declared (usually rad/s, m/s^2, and SampleTimeFine in 1e-4 s, for which rate_hz stands in)"
+        )
+    return "xsens-dot"
+
+
 def _rows_of_numbers(rows: list[str]) -> str | None:
-    """Tell the files without header apart by the number of columns and the size of the values."""
-    try:
-        values = [[float(text) for text in line.replace(",", " ").split()] for line in rows[:2]]
-    except ValueError:
-        return None
+    """Tell the files without header apart by the number of columns, where the stamps are and by the size of values."""
+    values = _leading_numbers(rows[:MOST_ROWS])
     count = len(values[0]) if values else 0
-    if count == 7:
+    columns = np.array([row for row in values if len(row) == count]).T
+    if count == 7 and _rises(columns[0]):
         # A latitude and longitude in degrees, or increments of an IMU: only the former exceed a radian or so.
         return "kf-gins-gnss" if max(abs(value) for value in values[0][1:3]) > 2.0 else "kf-gins"
-    return {13: "kf-gins-gnss", 11: "kf-gins-nav"}.get(count)
+    if count == 13 and _rises(columns[0]):
+        return "kf-gins-gnss"
+    if count == 11 and _rises(columns[1]) and columns[0][0] == round(columns[0][0]):
+        return "kf-gins-nav"
+    return None
+
+
+def _leading_numbers(rows: list[str]) -> list[list[float]]:
+    """Return the rows before the first that holds a text."""
+    values = []
+    for line in rows:
+        try:
+            values.append([float(text) for text in line.replace(",", " ").split()])
+        except ValueError:
+            break
+    return values
+
+
+def _rises(stamps: Array) -> bool:
+    """Whether a column can be that of the stamps, some of them wrong."""
+    return len(stamps) < FEW_ROWS or float(np.mean(np.diff(stamps) > 0.0)) > MOSTLY
 
 
 def _table(path: str | Path, rows: list[str]) -> str:

@@ -80,6 +80,21 @@ class Track:
         return replace(self, source=source, time=self.time[rows], position=self.position[rows], **given)
 
 
+@dataclass(frozen=True)
+class SensorRows:
+    """What a sensor beside IMUs and GNSS says."""
+
+    source: RowSource
+    kind: str
+    """height, heading or odometer"""
+    time: Array
+    """s, shape (M,)"""
+    value: Array
+    """height, m; heading, rad, clockwise from true north; forward speed, m/s; shape (M,)"""
+    std: Array | None = None
+    """of the value, shape (M,)"""
+
+
 LONGEST_BRIDGE = 3
 """Rows in a row that can be left out while the one after them stands for their time as well."""
 

@@ -1,12 +1,15 @@
-"""Solution files of RTKLIB (`.pos`): latitude, longitude, height with quality and standard deviations.
+"""Solution files of RTKLIB (`.pos`): positions with quality and standard deviations.
 
-Times come out as GPS seconds of the week of the first row, running on over the week's end.
+Latitude and longitude in degrees or in degrees, minutes, seconds, or coordinates in ECEF; stamps in GPST, UTC or JST
+(UTC + 9 h), by date or by week and second. Times come out as GPS seconds of the week of the first row, running on over
+the week's end.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,8 @@ from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
 WEEK_S = 604800.0
+JST_AHEAD_S = 9 * 3600.0
+"""of UTC"""
 GPS_EPOCH = np.datetime64("1980-01-06T00:00:00", "s")
 QUALITIES = {1: "fix", 2: "float", 3: "sbas", 4: "dgps", 5: "single", 6: "ppp"}
 ORDER = ("latitude", "longitude", "height", "q", "ns", "sdn", "sde", "sdu", "sdne", "sdeu", "sdun", "age", "ratio",
@@ -32,47 +37,101 @@ LEAP_DAYS = np.array(
 
 
 def read_gnss(path: str | Path) -> Track:
-    """Read positions in degrees; the counts per quality are in `quality`.
+    """Read positions; the counts per quality are in `quality`.
 
-    Raises InputError for positions in another form (degrees and minutes, ECEF, baselines) and for lines that are not
-    rows of numbers.
+    Without a header stamps are taken for GPST, positions for degrees, and a warning says so. Raises InputError for
+    baselines and for lines that are not rows of numbers.
     """
     found, lines = find(path), read_text(path).splitlines()
     header = " ".join(line for line in lines if line.startswith("%"))
-    _refuse_other_forms(found, header)
+    if "baseline" in header:
+        raise InputError(f"{found}: positions are baselines; expected latitude, longitude and height, or ECEF")
     numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("%")]
     if not numbered:
         raise InputError(f"{found}: has a header and no rows; expected positions")
     dated = "/" in numbered[0][1]
     rows = _rows(found, numbered)
-    utc = re.search(r"%\s+UTC\s+lat", header) is not None
-    time = _seconds_from_date(rows[:, :6], utc) if dated else _seconds_from_week(rows[:, :2])
+    clock = next((name for name in ("UTC", "JST") if re.search(rf"%\s+{name}\s+(lat|x-ecef)", header)), "GPST")
+    time = _seconds_from_date(rows[:, :6], clock) if dated else _seconds_from_week(rows[:, :2])
     values = rows[:, 6 if dated else 2 :]
+    if "(d'" in header:
+        angles = [_degrees(values[:, first : first + 3]) for first in (0, 3)]
+        values = np.column_stack([*angles, values[:, 6:]])
     names = _names(lines, values.shape[1])
+    columns = dict(zip(names, values.T, strict=False))
+    if "x-ecef" in columns:
+        columns |= _local(columns)
 
     def three(*wanted: str) -> Array | None:
-        return values[:, [names.index(name) for name in wanted]] if set(wanted) <= set(names) else None
+        return np.column_stack([columns[name] for name in wanted]) if set(wanted) <= set(columns) else None
 
-    velocity = three("vn", "ve", "vu")
+    position, velocity = three("latitude", "longitude", "height"), three("vn", "ve", "vu")
+    assert position is not None
     quality = Counter(int(q) for q in values[:, names.index("q")])
     counts = {QUALITIES.get(q, f"Q{q}"): count for q, count in sorted(quality.items())}
     return Track(
         RowSource(str(found), numbered[0][0]),
         time,
-        values[:, :3] * [DEG, DEG, 1.0],
+        position * [DEG, DEG, 1.0],
         above_sea="/geodetic" in header,
         position_std=three("sdn", "sde", "sdu"),
         velocity=None if velocity is None else velocity * [1.0, 1.0, -1.0],
         velocity_std=three("sdvn", "sdve", "sdvu"),
         quality=counts,
-        warnings=() if set(quality) <= {1} else (f"{found}: {_listed(counts)}",),
+        warnings=_warnings(found, header, counts),
     )
 
 
-def _refuse_other_forms(path: Path, header: str) -> None:
-    for mark, form in (("ecef", "ECEF coordinates"), ("baseline", "baselines"), ("(d'", "degrees and minutes")):
-        if mark in header:
-            raise InputError(f"{path}: positions are {form}; expected latitude, longitude (deg) and height (m)")
+def has_rows(lines: Sequence[str]) -> bool:
+    """Whether lines without a header look like rows: a date and a time of day, then numbers."""
+    return bool(lines) and re.match(r"\d{4}/\d\d/\d\d \d\d:\d\d:\d\d\.\d+(\s+-?[\d.]+){10}", lines[0]) is not None
+
+
+def _warnings(path: Path, header: str, counts: dict[str, int]) -> tuple[str, ...]:
+    unsaid = () if header else (f"{path}: has no header; stamps are taken for GPST, which UTC would be 18 s behind",)
+    return unsaid if set(counts) <= {QUALITIES[1]} else (*unsaid, f"{path}: {_listed(counts)}")
+
+
+def _degrees(parts: Array) -> Array:
+    """Return angles of degrees, minutes and seconds, shape (M, 3), the sign before the degrees, which may be zero."""
+    size = np.abs(parts) @ [1.0, 1.0 / 60.0, 1.0 / 3600.0]
+    return np.asarray(np.copysign(size, parts[:, 0]))
+
+
+def _local(columns: dict[str, Array]) -> dict[str, Array]:
+    """Return position (deg, m), std and velocity north, east, up of columns in ECEF."""
+    from pymap3d import ecef2geodetic
+
+    latitude, longitude, height = ecef2geodetic(*(columns[f"{axis}-ecef"] for axis in "xyz"))
+    found = {"latitude": latitude, "longitude": longitude, "height": height}
+    turn = _ecef_to_neu(latitude * DEG, longitude * DEG)
+    for prefix in ("sd", "sdv"):
+        if f"{prefix}zx" in columns:
+            covariance = turn @ _covariances(columns, prefix) @ turn.transpose(0, 2, 1)
+            std = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0))
+            found |= dict(zip((f"{prefix}{axis}" for axis in "neu"), std.T, strict=True))
+    if "vx" in columns:
+        velocity = np.einsum("tij,tj->ti", turn, np.column_stack([columns[f"v{axis}"] for axis in "xyz"]))
+        found |= dict(zip(("vn", "ve", "vu"), velocity.T, strict=True))
+    return found
+
+
+def _covariances(columns: dict[str, Array], prefix: str) -> Array:
+    """Return covariances, shape (M, 3, 3), of std and of the roots of covariances that carry their sign."""
+    pairs = (("x", "xy", "zx"), ("xy", "y", "yz"), ("zx", "yz", "z"))
+    roots = np.array([[columns[prefix + pair] for pair in row] for row in pairs]).transpose(2, 0, 1)
+    return np.asarray(roots * np.abs(roots))
+
+
+def _ecef_to_neu(latitude: Array, longitude: Array) -> Array:
+    """Return matrices to north, east, up at places, rad, shape (M, 3, 3)."""
+    sin_lat, cos_lat, sin_lon, cos_lon = np.sin(latitude), np.cos(latitude), np.sin(longitude), np.cos(longitude)
+    rows = [
+        [-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat],
+        [-sin_lon, cos_lon, np.zeros_like(sin_lon)],
+        [cos_lat * cos_lon, cos_lat * sin_lon, sin_lat],
+    ]
+    return np.array(rows).transpose(2, 0, 1)
 
 
 def _rows(path: Path, numbered: list[tuple[int, str]]) -> Array:
@@ -94,8 +153,11 @@ def _rows(path: Path, numbered: list[tuple[int, str]]) -> Array:
 def _names(lines: list[str], count: int) -> list[str]:
     """Return the names of the columns after the time, from the header or in the usual order."""
     for line in lines:
-        if line.startswith("%") and "sdn" in line:
-            names = [re.sub(r"\(.*", "", name).lower() for name in line[line.index("latitude") :].split()]
+        first = (
+            re.search("latitude|x-ecef", line) if line.startswith("%") and re.search(r"\bns\b.*\bratio", line) else None
+        )
+        if first:
+            names = [re.sub(r"\(.*", "", name).lower() for name in line[first.start() :].split()]
             return names[:count]
     return list(ORDER[:count])
 
@@ -104,13 +166,15 @@ def _seconds_from_week(rows: Array) -> Array:
     return np.asarray(rows[:, 1] + (rows[:, 0] - rows[0, 0]) * WEEK_S)
 
 
-def _seconds_from_date(rows: Array, utc: bool) -> Array:
+def _seconds_from_date(rows: Array, clock: str) -> Array:
     year, month, day = rows[:, :3].astype(int).T
     days = (year - 1970).astype("datetime64[Y]").astype("datetime64[M]") + (month - 1)
     midnight = (days.astype("datetime64[D]") + (day - 1)).astype("datetime64[s]")
     since = (midnight - GPS_EPOCH).astype(float) + rows[:, 3:] @ [3600.0, 60.0, 1.0]
-    if utc:
-        since = since + np.searchsorted(LEAP_DAYS, midnight, side="right")
+    if clock == "JST":
+        since = since - JST_AHEAD_S
+    if clock != "GPST":
+        since = since + np.searchsorted((LEAP_DAYS - GPS_EPOCH).astype(float), since, side="right")
     return np.asarray(since - np.floor(since[0] / WEEK_S) * WEEK_S)
 
 

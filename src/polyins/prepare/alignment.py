@@ -12,7 +12,7 @@ from polyins.errors import InputError
 from polyins.kernels import earth
 from polyins.model.attitude import euler_angles, in_succession, of_rotation_vectors, quaternions, rotation_matrices
 from polyins.model.geodesy import displacement, metres_per_unit
-from polyins.model.recording import GnssStream, Recording, StartOptions
+from polyins.model.recording import AidingStream, GnssStream, Recording, StartOptions
 from polyins.model.rig import DEG, Rig
 from polyins.prepare.first_motion import Beginning, FirstMotion
 from polyins.prepare.in_motion import Known
@@ -241,7 +241,7 @@ class _Search:
             wanted, self.sources["time"] = min(still[1], last - LEAST_LEFT), "end of the standstill"
             if self.recording.gnss is not None and self.options.position is None:
                 wanted = max(wanted, float(self.recording.gnss.time[0]))
-        elif self.options.heading is None and self.options.heading_from != "reference" and self.fixes is not None:
+        elif self.fixes is not None and self.options.heading_from != "reference" and not self._heading_is_told():
             self.first = self._first_motion(float(first), None)
             return self._epoch(self.first.time, UNDER_WAY)
         elif self.fixes is not None and self.options.position is None:
@@ -251,6 +251,14 @@ class _Search:
         else:
             wanted, self.sources["time"] = first, "first epoch"
         return self._epoch(float(wanted), self.sources["time"])
+
+    def _heading_is_told(self) -> bool:
+        """Whether a heading is given or a sensor shows one, so that nothing has to move."""
+        return self.options.heading is not None or (self.options.heading_from == "auto" and self._shown() is not None)
+
+    def _shown(self) -> AidingStream | None:
+        """Return the sensor of heading, if there is one."""
+        return next((one for one in self.recording.aiding if one.kind == "heading" and len(one.time)), None)
 
     def _epoch(self, wanted: float, source: str) -> float:
         """Return the first epoch from a time on, which has to be within the data."""
@@ -451,8 +459,8 @@ class _Search:
             self.sources["heading"] = "given"
             std = 1.0 * DEG if options.attitude_std is None else float(options.attitude_std[2])
             return self._carried(options.heading, std, options.heading_time, time, still)
-        shown = next((stream for stream in self.recording.aiding if stream.kind == "heading"), None)
-        if wanted != "auto" or shown is None or not len(shown.time):
+        shown = self._shown()
+        if wanted != "auto" or shown is None:
             return None
         first = int(np.argmin(np.abs(shown.time - time)))
         offsets = [sensor.offset_std for sensor in self.recording.rig.sensors if sensor.kind == "heading"]

@@ -17,7 +17,7 @@ from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats import kf_gins, rtklib, table, xsens_dot
 from polyins.formats.columns import column_names, read_columns
-from polyins.formats.recognize import data_format
+from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, Track
 from polyins.model.recording import Array
 
@@ -58,6 +58,8 @@ def read_stream(path: str | Path) -> tuple[Stream, tuple[str, ...]]:
         raise InputError(f"{find(path)}: looks like a configuration; expected IMU data or positions")
     if kind == "table":
         return _read_table(path)
+    if log_format(path) is not None:
+        return _only_stream(path), ()
     readers: dict[str, Any] = {
         "xsens-dot": xsens_dot.read_imu,
         "kf-gins": kf_gins.read_imu,
@@ -66,6 +68,16 @@ def read_stream(path: str | Path) -> tuple[Stream, tuple[str, ...]]:
         "rtklib-pos": rtklib.read_gnss,
     }
     return readers[kind](path), ()
+
+
+def _only_stream(path: str | Path) -> Stream:
+    """Return the one stream of a log that holds IMU data or positions."""
+    log = read_log(path)
+    streams: dict[str, Stream] = {**log.imus, **log.tracks}
+    found = {name: rows for name, rows in streams.items() if name not in log.unusable}
+    if len(found) != 1:
+        raise InputError(f"{find(path)}: holds {', '.join(found) or 'no stream'}; expected one stream")
+    return next(iter(found.values()))
 
 
 def _read_table(path: str | Path) -> tuple[Stream, tuple[str, ...]]:

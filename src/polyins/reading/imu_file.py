@@ -123,7 +123,7 @@ def _after(rows: ImuRows, time: float) -> ImuRows:
 
 def can_be_read_in_order(entry: ImuEntry) -> bool:
     """Whether a file has a format whose rows do not depend on one another, and is packed only where it is text."""
-    if _kind(entry) == "xsens-dot":
+    if _kind(entry) in ("xsens-dot", "log"):
         return False
     parquet = columns.is_parquet(entry.file)
     return not (parquet and find(entry.file).suffix == ".gz")

@@ -24,6 +24,7 @@ from polyins.model.findings import Finding
 from polyins.model.recording import Array, ImuStream
 from polyins.model.rig import DEG, Imu, ImuErrors, NoiseGrade
 from polyins.prepare.plausible import limits_of
+from polyins.reading.log_streams import imu_of
 
 FULL = 0.999
 """A rate above this part of the full scale has reached it."""
@@ -101,6 +102,10 @@ def _rows(entry: ImuEntry, place: str) -> ImuRows:
     kind: str = entry.format
     if kind == "auto":
         kind = "table" if entry.columns else imu_format(entry.file)
+    if kind == "log":
+        return _counted(imu_of(entry.file, entry.stream), entry)
+    if entry.stream:
+        raise InputError(f"{place}: stream is given; expected it of a log with several only")
     if entry.columns and kind != "table":
         raise InputError(f"{place}: columns are given and format is {kind}; expected columns with format table only")
     if kind == "wheel-ins":
@@ -109,7 +114,11 @@ def _rows(entry: ImuEntry, place: str) -> ImuRows:
         return xsens_dot.read_imu(entry.file, entry.rate_hz)
     if kind == "table":
         return table.read_imu(entry.file, entry.columns, entry.rate_hz)
-    rows = kf_gins.read_imu(entry.file)
+    return _counted(kf_gins.read_imu(entry.file), entry)
+
+
+def _counted(rows: ImuRows, entry: ImuEntry) -> ImuRows:
+    """Take row number / rate for the stamps, if the entry says so."""
     return replace(rows, time=np.arange(len(rows.time)) / entry.rate_hz) if entry.rate_hz else rows
 
 

@@ -57,7 +57,7 @@ def read_config(path: str | Path) -> Settings:
             values, warnings = program.translated(document)
             document = Document(document.path, values)
             break
-    return _located(document), document, warnings
+    return located(document), document, warnings
 
 
 def names_of(settings: Sequence[Settings]) -> list[str]:
@@ -82,10 +82,11 @@ def names_of(settings: Sequence[Settings]) -> list[str]:
 
 def load_document(document: Document) -> Recording:
     """Read the recording that the values of a configuration describe; raises InputError as `load` does."""
-    return build(_located(document), document)
+    return build(located(document), document)
 
 
-def _located(document: Document) -> Config:
+def located(document: Document) -> Config:
+    """Return the configuration that a document holds, with absolute paths; raises InputError as `parse` does."""
     config = parse(document)
     with document.at(["dataset"]):
         folder = catalogue.fetch(config.dataset) if config.dataset else document.path.parent.resolve()
@@ -138,6 +139,7 @@ def assemble(
     if wheels_known:
         notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
     if config.reference:
+        _one_datum(config, document)
         reference, kind, texts = read_reference(config.reference, document, span)
         geodetic = _one_kind(geodetic, kind, document.place(["reference"]))
         notes += texts
@@ -247,6 +249,18 @@ def _one_kind(known: bool | None, new: bool, place: str) -> bool:
         kinds = {True: "latitude and longitude", False: "on a local plane"}
         raise InputError(f"{place}: positions are {kinds[new]}, those before {kinds[known]}; expected one kind")
     return new
+
+
+def _one_datum(config: Config, document: Document) -> None:
+    """Refuse heights of which only one are left as they are: nothing says that they count from the same."""
+    if (
+        config.gnss
+        and config.reference
+        and (config.gnss.height == "as-given") != (config.reference.height == "as-given")
+    ):
+        raise document.error(
+            ["reference", "height"], "is as-given for one of gnss and reference; expected it for both, or neither"
+        )
 
 
 def _with_absolute_paths(config: Config, folder: Path, path: Path) -> Config:

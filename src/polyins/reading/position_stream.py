@@ -18,6 +18,7 @@ from polyins.formats.rows import Track
 from polyins.model.geodesy import displacement
 from polyins.model.recording import Array, GnssStream, Reference
 from polyins.model.rig import DEG, check_lever_arm
+from polyins.reading.log_streams import track_of
 
 Span = tuple[float, float]
 
@@ -31,18 +32,29 @@ def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) 
         kind = "table" if entry.columns else track_format(entry.file)
     if entry.columns and kind != "table":
         raise document.error([section, "columns"], f"given with format {kind}; expected columns with format table only")
-    readers = {"kf-gins": kf_gins.read_gnss, "kf-gins-nav": kf_gins.read_nav, "rtklib-pos": rtklib.read_gnss}
-    track = readers[kind](entry.file) if kind in readers else table.read_track(entry.file, entry.columns)
+    if kind == "log":
+        track = track_of(entry.file, entry.stream)
+    elif entry.stream:
+        raise document.error([section, "stream"], "is given; expected it of a log with several only")
+    else:
+        track = _file_track(entry, kind)
     warnings = list(stream_checks.check_track(track, section))
     track = replace(track, time=track.time + entry.clock_offset_s)
     return _above_ellipsoid(track, entry, section, document), warnings
+
+
+def _file_track(entry: GnssEntry | ReferenceEntry, kind: str) -> Track:
+    readers = {"kf-gins": kf_gins.read_gnss, "kf-gins-nav": kf_gins.read_nav, "rtklib-pos": rtklib.read_gnss}
+    return readers[kind](entry.file) if kind in readers else table.read_track(entry.file, entry.columns)
 
 
 def _above_ellipsoid(track: Track, entry: GnssEntry | ReferenceEntry, section: str, document: Document) -> Track:
     """Convert heights above the sea, or refuse them."""
     if entry.height == "ellipsoidal" and track.above_sea:
         raise document.error(
-            [section, "height"], f"heights in {track.source.path} are above the sea; expected height: sea-level"
+            [section, "height"],
+            f"heights in {track.source.path} are above the sea; expected height: sea-level with geoid_height_m, or "
+            "as-given to have the solution's above the sea",
         )
     shift = height_shift(entry, track.geodetic, track.above_sea)
     if shift is None:
@@ -59,7 +71,7 @@ def height_shift(entry: GnssEntry | ReferenceEntry, geodetic: bool, above_sea: b
 
     `geodetic`: the positions are; `above_sea`: whoever gives them says so, else the configuration may.
     """
-    if not geodetic or not (above_sea or entry.height == "sea-level"):
+    if entry.height == "as-given" or not geodetic or not (above_sea or entry.height == "sea-level"):
         return 0.0
     return entry.geoid_height_m
 
@@ -77,6 +89,9 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         raise document.error(["gnss"], f"{track.source.path} has no position std; expected position_std_m")
     stream_checks.check_std(track.source, std)
     warnings += stream_checks.check_within(track.source, "GNSS", track.time, span)
+    if entry.height == "as-given" and track.geodetic:
+        datum = "the sea" if track.above_sea else "what those of the file are above, which is not known here"
+        warnings.append(f"{track.source.path}: heights of the solution are above {datum}")
     track = _converted(track, entry, document)
     kept = thinned(track.time, entry.rate_hz) if entry.rate_hz else np.arange(len(track.time))
     velocity = track.velocity if track.velocity_std is not None else None

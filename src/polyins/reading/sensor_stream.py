@@ -13,9 +13,12 @@ from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.files import find_named
 from polyins.formats.columns import read_columns
+from polyins.formats.rows import SensorRows
 from polyins.formats.table import SECONDS
 from polyins.model.recording import AidingStream, Array, NonholonomicOptions
 from polyins.model.rig import DEG, AidingSensor
+from polyins.reading.log_streams import is_log, sensor_of
+from polyins.reading.position_stream import thinned
 
 Span = tuple[float, float]
 
@@ -72,23 +75,31 @@ def read_sensors(config: Config, document: Document, span: Span) -> tuple[tuple[
 def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tuple[AidingStream, list[str]]:
     with document.at([kind, "file"]):
         find_named(entry.file)
-    columns, unit = _columns(kind, entry, document)
-    wanted = [columns.time.name, columns.value, *([] if columns.std is None else [columns.std])]
-    source, (stamps, value, *std) = read_columns(entry.file, wanted)
-    time = stamps * SECONDS[columns.time.unit] + entry.clock_offset_s
+    rows = _rows(kind, entry, document)
+    source, time = rows.source, rows.time + entry.clock_offset_s
     if not len(time):
         raise InputError(f"{source.path}: no rows; expected those of {kind}")
-    stream_checks.check_finite(source, {"time": time, kind: value})
+    stream_checks.check_finite(source, {"time": time, kind: rows.value})
     stream_checks.check_order(source, time)
     warnings = stream_checks.check_within(source, kind, time, span)
     given = std_of(entry)
-    if given is None and not std:
+    if given is None and rows.std is None:
         raise document.error([kind], f"{source.path} has no std; expected a column std or {key_of(type(entry), 'std')}")
-    stds = std[0] * unit if given is None else np.full(len(time), given)
+    stds = np.full(len(time), given) if rows.std is None or given is not None else rows.std
     stream_checks.check_finite(source, {"std": stds})
     for row in np.flatnonzero(stds <= 0.0)[:1]:
         raise InputError(f"{source.place(int(row))}: std of {kind} is {stds[row]:g}; expected a number above zero")
-    return AidingStream(kind, time, value * unit, with_constraint(entry, stds)), list(warnings)
+    kept = thinned(time, entry.rate_hz) if entry.rate_hz else np.arange(len(time))
+    return AidingStream(kind, time[kept], rows.value[kept], with_constraint(entry, stds[kept])), list(warnings)
+
+
+def _rows(kind: str, entry: SensorEntry, document: Document) -> SensorRows:
+    if entry.columns is None and is_log(entry.file, entry.stream):
+        return sensor_of(entry.file, entry.stream, kind)
+    columns, unit = _columns(kind, entry, document)
+    wanted = [columns.time.name, columns.value, *([] if columns.std is None else [columns.std])]
+    source, (stamps, value, *std) = read_columns(entry.file, wanted)
+    return SensorRows(source, kind, stamps * SECONDS[columns.time.unit], value * unit, std[0] * unit if std else None)
 
 
 def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorColumns, float]:

@@ -10,8 +10,8 @@ import numpy as np
 from polyins.checks.stream_checks import FARTHEST_OFF_AXIS_M, GAP_INTERVALS, WHEEL_RATE_RAD_S, check_imu, check_track
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats.recognize import data_format
-from polyins.formats.rows import ImuRows, Track
+from polyins.formats.recognize import data_format, log_format, read_log
+from polyins.formats.rows import ImuRows, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 from polyins.reading.guess import Stream, read_stream
@@ -28,6 +28,8 @@ def inspect(path: str | Path) -> Facts:
     kind = data_format(path)
     if kind == "configuration":
         return _describe_configuration(path)
+    if log_format(path) is not None:
+        return _describe_log(path, kind)
     stream, guesses = read_stream(path)
     return {**describe(stream), "format": kind, **_problems(stream, guesses)}
 
@@ -36,6 +38,28 @@ def describe(stream: Stream) -> Facts:
     """Describe one stream: rows, span, rate, gaps, stamps, NaN, and what its values say."""
     facts = {"file": stream.source.path, "kind": "imu" if isinstance(stream, ImuRows) else "positions"}
     return {**facts, **_timing(stream.time), **(_imu(stream) if isinstance(stream, ImuRows) else _positions(stream))}
+
+
+def _describe_log(path: str | Path, kind: str) -> Facts:
+    log = read_log(path)
+    return {
+        "file": str(find(path)),
+        "kind": "log",
+        "format": kind,
+        "clock": log.clock,
+        "utc_of_zero_s": log.utc_of_zero,
+        "fix_age_s": log.fix_age,
+        "streams": [_describe_stream(name, rows, log.unusable.get(name)) for name, rows in log.streams.items()],
+        "problems": [] if log.streams else ["holds neither IMU data nor positions"],
+        "warnings": list(log.notes),
+    }
+
+
+def _describe_stream(name: str, rows: ImuRows | Track | SensorRows, why_not: str | None) -> Facts:
+    """Say what a stream of a log holds, and what it is good for."""
+    facts: Facts = {"kind": rows.kind, **_timing(rows.time)} if isinstance(rows, SensorRows) else describe(rows)
+    problems = {} if isinstance(rows, SensorRows) else _problems(rows, ())
+    return {"stream": name, **facts, "usable": why_not is None, "not_used": why_not, **problems}
 
 
 def listing(facts: Facts, indent: str = "") -> str:

@@ -1,0 +1,310 @@
+"""Logs of real vehicles: read is what their own libraries read, and one command makes a recording of each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from polyins import cli
+from polyins.errors import InputError
+from polyins.formats.log import Log
+from polyins.formats.recognize import data_format, read_log
+from polyins.formats.rows import Track, intervals
+from polyins.formats.rtklib import read_gnss
+from polyins.model.geodesy import displacement
+from polyins.model.rig import DEG
+from polyins.reading.guess import read_stream
+from polyins.reading.loading import load, load_settings
+from polyins.tools.inspect import inspect
+from polyins.tools.propose import propose, settings_of
+
+LOGS = [
+    "ulog/ekf_failure.ulg",
+    "ulog/roboto.ulg",
+    "ulog/small.ulg",
+    "ulog/tagged.ulg",
+    "dataflash/log0036.bin",
+    "dataflash/sample.bin",
+    "rosbag/husky.bag",
+    "rosbag2/husky.db3",
+    "mcap/husky.mcap",
+]
+SENSORS = {"attitude": ("heading", -1), "wheel": ("odometer", 3)}
+"""by section of what is expected: the kind, and where in a row its value stands"""
+
+
+@pytest.fixture(scope="module")
+def logs(data_folder: Path) -> Path:
+    folder = data_folder / "logs"
+    if not folder.is_dir():
+        pytest.skip(f"no logs: {folder} is not a folder")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def expected(logs: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((logs / "expected.json").read_text())
+    return found
+
+
+def agree_with_samples(time: np.ndarray, values: np.ndarray, samples: dict[str, list[float]], tolerance: float) -> None:
+    for row, sample in samples.items():
+        wanted = np.array(sample[: 1 + values.shape[1]])
+        assert time[int(row)] == pytest.approx(wanted[0], abs=1e-6)
+        np.testing.assert_allclose(values[int(row)], wanted[1:], rtol=1e-6, atol=tolerance)
+
+
+def check_imus(log: Log, wanted: dict[str, Any]) -> None:
+    assert set(log.imus) == set(wanted)
+    for name, facts in wanted.items():
+        rows = log.imus[name]
+        assert len(rows.time) == facts["rows"]
+        assert (rows.time[0], rows.time[-1]) == pytest.approx((facts["first_s"], facts["last_s"]), abs=1e-6)
+        assert 1.0 / np.median(np.diff(rows.time)) == pytest.approx(facts["median_rate_hz"], rel=1e-6)
+        steps = intervals(rows.time)[:, None]
+        rates = np.column_stack([rows.dtheta / steps, rows.dvel / steps])
+        agree_with_samples(rows.time, rates, facts["sample"], 1e-8)
+        np.testing.assert_allclose(rates[:, :3].mean(axis=0), facts["gyro_mean_rad_s"], rtol=1e-5, atol=1e-8)
+        np.testing.assert_allclose(rates[:, 3:].mean(axis=0), facts["accel_mean_m_s2"], rtol=1e-5)
+
+
+def check_tracks(log: Log, wanted: dict[str, Any]) -> None:
+    receivers = {name: facts for name, facts in wanted.items() if "rows_3d_fix" in facts}
+    assert set(log.tracks) == set(receivers)
+    for name, facts in receivers.items():
+        track = log.tracks[name]
+        assert sum(track.quality.values()) == facts["rows"]
+        assert len(track.time) == facts["rows_3d_fix"]
+        if facts["rows_3d_fix"] == facts["rows"]:
+            rows = facts["sample"]
+            place = track.position / [DEG, DEG, 1.0]
+            agree_with_samples(track.time, place[:, :2], rows, 2e-10)
+            height = place[[int(row) for row in rows], 2]
+            np.testing.assert_allclose(height, [row[3] for row in rows.values()], atol=1e-3)
+            assert track.time[-1] == pytest.approx(facts["last_s"], abs=1e-6)
+
+
+def check_sensors(log: Log, wanted: dict[str, Any]) -> None:
+    for section, (kind, place) in SENSORS.items():
+        known = {name: rows for name, rows in log.sensors.items() if rows.kind == kind}
+        for name, rows in known.items():
+            facts = wanted[section][name]
+            assert len(rows.time) == facts["rows"]
+            scale = 1.0 / DEG if kind == "heading" else 1.0
+            for row, sample in facts["sample"].items():
+                assert rows.time[int(row)] == pytest.approx(sample[0], abs=1e-6)
+                off = rows.value[int(row)] * scale - sample[place]
+                assert (off + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_streams_are_what_the_own_library_reads(name: str, logs: Path, expected: dict[str, Any]) -> None:
+    log, wanted = read_log(logs / name), expected[name]
+    check_imus(log, wanted["imu"])
+    check_tracks(log, wanted["gnss"])
+    check_sensors(log, wanted)
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_a_proposal_is_a_recording(name: str, logs: Path, tmp_path: Path) -> None:
+    config = tmp_path / "proposed.yaml"
+    config.write_text(propose([logs / name]))
+    recording = load(config)
+    assert recording.gnss is not None
+    assert len(recording.imus) == (2 if "dataflash" in name else 1)
+    assert any("assumed" in text for text in load_settings(settings_of([logs / name])).warnings)
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_info_says_what_each_stream_is_good_for(name: str, logs: Path) -> None:
+    facts = inspect(logs / name)
+    assert facts["kind"] == "log"
+    assert facts["problems"] == []
+    assert {stream["kind"] for stream in facts["streams"] if stream["usable"]} >= {"imu", "positions"}
+
+
+def test_thin_imus_of_px4_are_named_with_what_to_set(logs: Path) -> None:
+    log = read_log(logs / "ulog" / "ekf_failure.ulg")
+    assert "2 Hz" in log.unusable["vehicle_imu[1]"]
+    assert "SDLOG_PROFILE" in log.unusable["vehicle_imu[1]"]
+    assert (log.fix_age, log.antenna) == (pytest.approx(0.11), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("name", ["ulog/ekf_failure.ulg", "dataflash/log0036.bin"])
+def test_utc_of_a_fix(name: str, logs: Path, expected: dict[str, Any]) -> None:
+    log = read_log(logs / name)
+    (receiver,) = [facts for one, facts in expected[name]["gnss"].items() if one in ("vehicle_gps_position[0]", "GPS")]
+    row = receiver["sample"]["0"]
+    # GPS time was 17 s ahead of UTC in 2016, when the second log was written
+    utc = row[-1] if "ulog" in name else 315964800 + row[-2] * 604800 + row[-1] - 17
+    assert log.utc_of_zero is not None
+    assert log.utc_of_zero + row[0] == pytest.approx(utc, abs=0.25)
+
+
+def test_the_forward_axis_of_a_robot_on_its_side(logs: Path) -> None:
+    assert "axes: [-z, x, -y]" in propose([logs / "rosbag" / "husky.bag"])
+
+
+def test_a_stream_has_to_be_named_where_there_are_several(logs: Path, tmp_path: Path) -> None:
+    config = tmp_path / "two.yaml"
+    config.write_text(f"imus: [{{file: {logs / 'dataflash' / 'log0036.bin'}}}]\nstart: {{heading_deg: 0}}\n")
+    with pytest.raises(InputError, match=r"no stream is named; expected one of IMU, IMU2"):
+        load(config)
+    config.write_text(config.read_text().replace(".bin", ".bin, stream: IMU3"))
+    with pytest.raises(InputError, match=r"'IMU3' is named; expected one of IMU, IMU2"):
+        load(config)
+
+
+@pytest.mark.parametrize("name", ["dataflash", "log", "matlab", "mcap", "rosbag", "sqlite", "ubx", "ulog"])
+def test_random_bytes_are_refused(name: str, logs: Path) -> None:
+    with pytest.raises(InputError, match=r"damaged|not read|no known|neither|holds no"):
+        inspect(logs / "cases" / "unknown-binary" / f"{name}.bin")
+
+
+@pytest.mark.parametrize("name", ["static-120s", "turns-80s"])
+def test_an_array_of_bytes_is_refused_by_name(name: str, logs: Path) -> None:
+    with pytest.raises(InputError, match="looks like MIMU4444, which is not read"):
+        inspect(logs / "array-binary" / f"{name}.bin")
+
+
+@pytest.mark.parametrize("name", ["headerless-7/imu.csv", "numeric-11/imu.csv"])
+def test_numbers_without_header_are_not_taken_for_kf_gins(name: str, logs: Path) -> None:
+    assert data_format(logs / "cases" / name) == "table"
+    with pytest.raises(InputError, match="no known meaning"):
+        inspect(logs / "cases" / name)
+
+
+def test_both_orders_of_thirteen_columns(logs: Path) -> None:
+    from polyins.formats import kf_gins
+
+    first, matlab = (
+        kf_gins.read_gnss(logs / "cases" / "kf-gins-13" / name) for name in ("velocity-first.txt", "matlab.txt")
+    )
+    np.testing.assert_array_equal(first.velocity, matlab.velocity)
+    np.testing.assert_array_equal(first.position_std, matlab.position_std)
+    assert matlab.position_std is not None
+    np.testing.assert_allclose(matlab.position_std, np.tile([0.02, 0.02, 0.04], (len(matlab.time), 1)))
+    assert first.warnings == ()
+    assert "taken as std" in matlab.warnings[0]
+
+
+POSITIONS = [
+    "ecef_gpst2_111_dd",
+    "header_missing",
+    "lla_gpst2_111_dd",
+    "lla_gpst2_111_ds",
+    "lla_gpst_000_dd",
+    "lla_jst_111_dd",
+    "lla_utc_111_dd",
+    "spirent",
+]
+
+
+@pytest.mark.parametrize("name", POSITIONS)
+def test_positions_of_rtklib_in_all_forms(name: str, logs: Path, expected: dict[str, Any]) -> None:
+    facts = expected[f"rtklib-pos/{name}.pos"]["gnss"]["pos"]
+    track, _ = read_stream(logs / "rtklib-pos" / f"{name}.pos")
+    assert isinstance(track, Track)
+    assert len(track.time) == facts["rows"]
+    for row, sample in facts["sample"].items():
+        at = int(row)
+        assert track.time[at] == pytest.approx(sample[0], abs=1e-6)
+        np.testing.assert_allclose(track.position[at, :2] / DEG, sample[1:3], rtol=0.0, atol=2e-10)
+        assert track.position[at, 2] == pytest.approx(sample[3], abs=2e-4)
+        if "ecef" not in name and len(sample) > 9:
+            assert track.velocity is not None
+            np.testing.assert_allclose(track.velocity[at], np.array(sample[9:12]) * [1, 1, -1], atol=1e-12)
+
+
+def test_ecef_and_degrees_of_one_drive(logs: Path) -> None:
+    folder = logs / "cases" / "pos-jst-ecef"
+    tracks = [read_gnss(folder / f"{name}.pos") for name in ("gpst", "utc", "jst", "ecef-gpst", "ecef-jst")]
+    for track in tracks:
+        assert (track.time[0], track.time[-1]) == pytest.approx((36000.25, 36010.25), abs=1e-3)
+        assert track.velocity is not None
+        assert track.position_std is not None
+        off = displacement(track.position, tracks[0].position[0], True)
+        np.testing.assert_allclose(off, displacement(tracks[0].position, tracks[0].position[0], True), atol=1e-3)
+        np.testing.assert_allclose(track.velocity, tracks[0].velocity, atol=1e-4)
+        np.testing.assert_allclose(track.position_std, np.tile([0.02, 0.02, 0.04], (41, 1)), atol=5e-4)
+
+
+@pytest.mark.parametrize("name", ["neo-m8l", "neo-m8u", "zed-f9p-hp", "zed-f9r"])
+def test_positions_of_ublox(name: str, logs: Path, expected: dict[str, Any]) -> None:
+    log, wanted = read_log(logs / "ubx" / f"{name}.ubx"), expected[f"ubx/{name}.ubx"]["gnss"]
+    assert set(log.tracks) == {kind for kind in wanted if kind.startswith("NAV")}
+    for kind, track in log.tracks.items():
+        facts = wanted[kind]
+        assert len(track.time) == facts["rows_3d_fix"]
+        assert (track.time[0], track.time[-1]) == (facts["first_s"], facts["last_s"])
+        for row, sample in facts["sample"].items():
+            place = track.position[int(row)] / [DEG, DEG, 1.0]
+            np.testing.assert_allclose(place, sample[1:4], rtol=0.0, atol=1e-9)
+    coarse, row = log.tracks["NAV-PVT"], wanted["NAV-PVT"]["sample"]["0"]
+    assert coarse.velocity is not None
+    assert coarse.position_std is not None
+    np.testing.assert_allclose(coarse.velocity[0], row[5:8], atol=1e-12)
+    np.testing.assert_allclose(coarse.position_std[0], [row[8], row[8], row[9]], atol=1e-12)
+    assert log.utc_of_zero is not None
+    utc = np.datetime64(row[-1].split()[0]).astype("datetime64[s]").astype(float)
+    assert log.utc_of_zero + coarse.time[0] == pytest.approx(utc, abs=0.51)
+
+
+def test_a_receiver_alone_is_no_recording(logs: Path) -> None:
+    with pytest.raises(InputError, match=r"no IMU data; expected at least one file of them beside .*NAV-PVT"):
+        propose([logs / "ubx" / "zed-f9r.ubx"])
+
+
+def run(log: Path, out: Path) -> dict[str, Any]:
+    done = CliRunner().invoke(cli.cli, ["run", str(log), "--json", "--no-report", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def test_one_command_from_a_log_of_px4_to_a_result(logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "ulog" / "small.ulg", tmp_path)
+    assert summary["verdict"]["level"] == "trust"
+    assert summary["coverage"]["of_recording"] > 0.95
+    assert "sensor of heading" in summary["start"]["heading"]
+    assert any("vehicle_imu[2] is not used: 2 Hz" in text for text in summary["warnings"])
+    assert (tmp_path / "solution.parquet").is_file()
+
+
+def test_a_forward_axis_that_nothing_tells_is_doubted(logs: Path, tmp_path: Path) -> None:
+    common = logs / "cases" / "common"
+    inputs = [str(common / name) for name in ("imu.csv", "gnss.csv")]
+    done = CliRunner().invoke(cli.cli, ["run", *inputs, "--json", "--no-report", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    verdict = json.loads(done.stdout)["verdict"]
+    assert verdict["level"] == "doubt"
+    assert ["forward is a guess" in one["text"] for one in verdict["findings"] if one["severity"] == "doubt"] == [True]
+
+
+def test_one_command_from_a_log_of_ardupilot_to_a_result(logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "dataflash" / "sample.bin", tmp_path)
+    assert summary["imus"] == 2
+    assert summary["verdict"]["level"] in ("trust", "doubt")
+    assert any("no IMU has data for 627.9 s" in text for text in summary["warnings"])
+    assert any("heights of the solution are above the sea" in text for text in summary["warnings"])
+
+
+@pytest.mark.parametrize(("name", "day"), [("boat", "2018-08-20"), ("m9n", "2020-07-11")])
+def test_positions_of_nmea(name: str, day: str, logs: Path, expected: dict[str, Any]) -> None:
+    track, wanted = read_log(logs / "nmea" / f"{name}.nmea").tracks["GGA"], expected[f"nmea/{name}.nmea"]["gnss"]
+    midnight = np.datetime64(day, "s").astype(float)
+    assert len(track.time) == wanted["GGA"]["rows_3d_fix"]
+    for row, sample in wanted["GGA"]["sample"].items():
+        at = int(row)
+        assert track.time[at] - midnight == sample[0]
+        np.testing.assert_allclose(track.position[at, :2] / DEG, sample[1:3], rtol=0.0, atol=1e-9)
+        assert track.position[at, 2] == pytest.approx(sample[3] + sample[4], abs=1e-9)
+    if "GST" in wanted:
+        np.testing.assert_array_equal(track.position_std[30], wanted["GST"]["sample"]["30"][1:])
+    else:
+        assert track.position_std is None
