@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG
-from polyins.prepare.in_motion import BA, BG, PHI, Fixes, Known, MeanImu, P, Search, V, _Problem, _rotation
+from polyins.prepare.in_motion import BA, BG, PHI, FixSeries, MeanImu, P, Prior, Search, V, _Problem, _rotation
 from polyins.simulation.increments import increments
 from polyins.simulation.motions import sideways
 from polyins.simulation.path import Path
@@ -26,7 +26,7 @@ def truth() -> Path:
     return sideways(np.random.default_rng(4), DURATION + 2.0)
 
 
-def measured(truth: Path, biases: Array, noise: float = 0.0, velocities: bool = True) -> tuple[MeanImu, Fixes]:
+def measured(truth: Path, biases: Array, noise: float = 0.0, velocities: bool = True) -> tuple[MeanImu, FixSeries]:
     exact = increments(truth, 50.0)
     time = np.concatenate([[0.0], exact.time])
     dt = np.diff(time)[:, None]
@@ -37,7 +37,7 @@ def measured(truth: Path, biases: Array, noise: float = 0.0, velocities: bool = 
     at = np.arange(0.0, DURATION, 0.5)
     fixed = truth.truth(at, LEVER)
     std = np.full((len(at), 3), 0.02)
-    return imu, Fixes(
+    return imu, FixSeries(
         time=at,
         position=displacement(fixed.position, fixed.position[0], True),
         position_std=std,
@@ -48,8 +48,8 @@ def measured(truth: Path, biases: Array, noise: float = 0.0, velocities: bool = 
     )
 
 
-@pytest.mark.parametrize("known", [Known(), Known(heading=1.0, heading_std=0.1, velocity=np.ones(3), velocity_std=0.5)])
-def test_the_design_is_the_derivative_of_the_residual(truth: Path, known: Known) -> None:
+@pytest.mark.parametrize("known", [Prior(), Prior(heading=1.0, heading_std=0.1, velocity=np.ones(3), velocity_std=0.5)])
+def test_the_design_is_the_derivative_of_the_residual(truth: Path, known: Prior) -> None:
     problem = _Problem(*measured(truth, np.zeros(6)), known)
     x = np.zeros(15)
     x[V], x[BG], x[BA] = [1.0, -2.0, 0.1], [0.01, -0.02, 0.015], [0.1, -0.05, 0.02]
@@ -86,7 +86,7 @@ def test_noise_alone_tells_no_heading() -> None:
     dvel = 0.05 * np.sqrt(0.05) * rng.standard_normal((len(time) - 1, 3)) + [0.0, 0.0, -9.8 * 0.05]
     at = np.arange(0.0, DURATION, 1.0)
     std = np.full((len(at), 3), 0.02)
-    fixes = Fixes(at, 0.02 * rng.standard_normal((len(at), 3)), std, None, None, np.zeros(3), 9.8)
+    fixes = FixSeries(at, 0.02 * rng.standard_normal((len(at), 3)), std, None, None, np.zeros(3), 9.8)
     for stated in (0.05**2, 0.002**2):
         imu = MeanImu(time, np.zeros_like(dvel), dvel, np.zeros(3), BIAS_STD, (stated, 1e-8, 1e-10))
         assert Search(imu, fixes).over(DURATION)[0].std(PHI)[2] > 15.0 * DEG

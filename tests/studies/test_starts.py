@@ -7,11 +7,11 @@ import pytest
 
 from polyins.model.rig import DEG
 from polyins.studies import starts
-from polyins.studies.start_cases import KINDS, SHOWN, Outcome, case
+from polyins.studies.start_cases import KINDS, SHOWN, StartOutcome, case
 
 
 @pytest.fixture(scope="module")
-def outcomes() -> list[Outcome]:
+def outcomes() -> list[StartOutcome]:
     return starts.outcomes_of(range(1, 2 * len(KINDS), 2))
 
 
@@ -22,7 +22,7 @@ def test_every_kind_is_there_and_a_number_is_one_case() -> None:
     assert one.method == again.method
 
 
-def test_what_moves_starts_inside_its_std(outcomes: list[Outcome]) -> None:
+def test_what_moves_starts_inside_its_std(outcomes: list[StartOutcome]) -> None:
     table = starts.table(outcomes)
     assert all(table[kind]["started"] == 1 for kind in SHOWN)
     assert table["all"]["heading_inside"] == 1.0
@@ -30,7 +30,7 @@ def test_what_moves_starts_inside_its_std(outcomes: list[Outcome]) -> None:
     assert 0.0 < table["all"]["tilt_over_std_worst"] < 4.5
 
 
-def test_a_refusal_says_what_is_missing(outcomes: list[Outcome]) -> None:
+def test_a_refusal_says_what_is_missing(outcomes: list[StartOutcome]) -> None:
     refused = [one for one in outcomes if one.refused]
     assert all("heading" in one.refused and "expected start.heading_deg" in one.refused for one in refused)
     assert len(refused) < len(outcomes) - len(SHOWN) + 1

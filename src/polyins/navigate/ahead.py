@@ -30,7 +30,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Increments:
+class HeldIncrements:
     """A sample of IMU `imu`, dtheta and dvel, (6,)."""
 
     time: float
@@ -42,15 +42,15 @@ class Increments:
 class Ahead:
     """What is held until it is told what it was."""
 
-    increments: list[Increments] = field(default_factory=list)
+    increments: list[HeldIncrements] = field(default_factory=list)
     measured: list[Measured] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         return bool(self.increments or self.measured)
 
-    def hold(self, one: Increments) -> list[Increments]:
+    def hold(self, one: HeldIncrements) -> list[HeldIncrements]:
         """Hold a sample; returns those held so far if it does not go on where they are."""
-        dropped: list[Increments] = []
+        dropped: list[HeldIncrements] = []
         if self.increments and abs(one.time - self.increments[-1].time) > FUTURE:
             dropped, self.increments = self.increments, []
         self.increments.append(one)
@@ -73,7 +73,7 @@ class Ahead:
         """Whether the IMUs have gone on ahead for as long as no lie lasts."""
         return bool(self.increments) and self.increments[-1].time - self.first > FUTURE
 
-    def in_order(self, snap: float) -> list[Increments | Measured]:
+    def in_order(self, snap: float) -> list[HeldIncrements | Measured]:
         """Return all that is held, and hold nothing more; a measurement goes before a sample nearer than `snap`, s."""
         dues = [(one.time, one) for one in self.increments] + [(one.sample.time - snap, one) for one in self.measured]
         self.increments, self.measured = [], []

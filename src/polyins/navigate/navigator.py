@@ -23,11 +23,11 @@ from polyins.model.rig import Rig
 from polyins.model.solution import Innovations, Trajectory
 from polyins.model.status import STATUSES, status_of
 from polyins.navigate import batch, checkpoint, events, outcome, restart
-from polyins.navigate.ahead import Ahead, Increments, Measured
+from polyins.navigate.ahead import Ahead, HeldIncrements, Measured
 from polyins.navigate.checkpoint import Made
 from polyins.navigate.choice import choose
 from polyins.navigate.events import Events
-from polyins.navigate.record import Part, Record
+from polyins.navigate.record import Record, Segment
 from polyins.navigate.refusals import NOT_FINITE, Refusals, unfit
 from polyins.navigate.restart import Pause
 from polyins.navigate.samples import GnssFix, ImuSample, Sample, SensorSample
@@ -261,7 +261,7 @@ class Navigator:
             return
         newest = self._assembly.newest
         if time > newest + FUTURE and newest > -math.inf:
-            for one in self._ahead.hold(Increments(time, i, values)):
+            for one in self._ahead.hold(HeldIncrements(time, i, values)):
                 self._assemble(one.imu, one.time, one.values)
             if self._ahead.goes_on:
                 self._end_pause(newest)
@@ -276,7 +276,7 @@ class Navigator:
     def _settle(self) -> None:
         """Take what is no longer ahead of the IMUs, which go on where they were, and refuse what still is."""
         for one in self._ahead.in_order(self._recording.options.gnss_snap):
-            if isinstance(one, Increments):
+            if isinstance(one, HeldIncrements):
                 self._assemble(one.imu, one.time, one.values)
             elif one.sample.time > self._assembly.newest + self.delay:
                 self._refuse(FUTURE_STAMPED)
@@ -292,7 +292,7 @@ class Navigator:
         else:
             self._assembly.newest = first
         for one in held:
-            if isinstance(one, Increments):
+            if isinstance(one, HeldIncrements):
                 self._add(one.imu, one.time, one.values)
                 self._step()
             elif self._starter is None:
@@ -555,7 +555,7 @@ class Navigator:
         self._schedule = batch.schedule_of(self._choice, self._recording, self.start)
         if math.isnan(self._record.interval):
             self._record.interval = float(time[1] - time[0])
-        self._record.part = Part(Windows(self._recording.rig, 1.0 / float(time[1] - time[0])))
+        self._record.part = Segment(Windows(self._recording.rig, 1.0 / float(time[1] - time[0])))
         return Timeline(prepared, self.delay)
 
     def _begin(self, first: Epoch, second: Epoch) -> None:

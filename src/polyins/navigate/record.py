@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass
-class Part:
+class Segment:
     """What there is between two pauses."""
 
     windows: Windows
@@ -80,7 +80,7 @@ class Record:
     """rows of the measurements of each part that a pause ended, see `outcome`"""
     findings: list[Finding] = field(default_factory=list)
     """of those parts and of the pauses"""
-    part: Part | None = None
+    part: Segment | None = None
 
     def take(self, time: float, state: Array, variances: Array) -> None:
         """Count a state."""
@@ -114,4 +114,4 @@ class Record:
         self.ended = [arrays[f"ended{n}"] for n in range(sum(name.startswith("ended") for name in arrays))]
         if "time" in arrays:
             *time, last = (float(stamp) for stamp in arrays["time"])
-            self.part = Part(Windows.restored(arrays), time, list(arrays["missing"]), last)
+            self.part = Segment(Windows.restored(arrays), time, list(arrays["missing"]), last)

@@ -15,7 +15,7 @@ from polyins.model.geodesy import displacement, metres_per_unit
 from polyins.model.recording import AidingStream, GnssStream, Recording, StartOptions
 from polyins.model.rig import DEG, Rig
 from polyins.prepare.first_motion import Beginning, FirstMotion
-from polyins.prepare.in_motion import Known
+from polyins.prepare.in_motion import Prior
 from polyins.prepare.timesync import Aligned
 from polyins.prepare.under_way import AROUND, HARDEST, GroundMotion, find_motion
 
@@ -283,9 +283,9 @@ class _Search:
 
     def _found_motion(self, begin: float, still: tuple[float, float] | None) -> FirstMotion | None:
         assert self.recording.gnss is not None
-        known = Known()
+        known = Prior()
         if still and still[0] <= begin <= still[1] + 0.5:
-            known = Known(velocity=np.zeros(3), velocity_std=STANDSTILL_SPEED)
+            known = Prior(velocity=np.zeros(3), velocity_std=STANDSTILL_SPEED)
         begin = max(begin, float(self.recording.gnss.time[0]))
         return self._beginning(still).find(begin, known, lambda time, until: self._course(time, until, still))
 
@@ -417,7 +417,7 @@ class _Search:
             if known is None:
                 self.first = self._first_motion(time, still)
             else:
-                self.first = self._beginning(still).at(time, Known(*known), lambda *_: None)
+                self.first = self._beginning(still).at(time, Prior(*known), lambda *_: None)
         return self.first is not None and abs(self.first.time - time) <= 2.0 / self.aligned.rate_hz
 
     def _acceleration(self, time: float) -> Array:

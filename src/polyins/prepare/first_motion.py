@@ -17,7 +17,7 @@ from polyins.kernels import earth
 from polyins.model.geodesy import displacement
 from polyins.model.recording import GnssStream, Recording
 from polyins.model.rig import DEG
-from polyins.prepare.in_motion import BG, PHI, Fixes, Known, MeanImu, Minimum, Search, V
+from polyins.prepare.in_motion import BG, PHI, FixSeries, MeanImu, Minimum, Prior, Search, V
 from polyins.prepare.timesync import Aligned
 from polyins.prepare.under_way import AROUND, agreeing
 
@@ -94,7 +94,7 @@ class Beginning:
         assert recording.gnss is not None
         self.gnss: GnssStream = recording.gnss
 
-    def find(self, begin: float, known: Known, course: Course) -> FirstMotion | None:
+    def find(self, begin: float, known: Prior, course: Course) -> FirstMotion | None:
         """Return the state at a time, or later where nothing moves yet; what is `known` is known at that time."""
         last, whole = min(float(self.gnss.time[-1]), float(self.aligned.time[-1])), True
         while True:
@@ -105,9 +105,9 @@ class Beginning:
                 return None
             # with more of them the fixes from there on may tell it yet
             whole = whole and last > begin + LONGEST
-            begin, known = begin + NEXT, Known()
+            begin, known = begin + NEXT, Prior()
 
-    def at(self, begin: float, known: Known, course: Course) -> FirstMotion | None:
+    def at(self, begin: float, known: Prior, course: Course) -> FirstMotion | None:
         """Return the state at a time by the fixes of a minute after it; None: they do not tell it."""
         epoch = int(np.searchsorted(self.aligned.time, begin))
         if epoch + 2 > len(self.aligned.time):
@@ -153,12 +153,12 @@ class Beginning:
         end = int(np.searchsorted(time, begin + LONGEST, "right")) + SETTLING
         return np.arange(np.searchsorted(time, begin), min(end, len(time)))
 
-    def _fixes(self, begin: float) -> Fixes:
+    def _fixes(self, begin: float) -> FixSeries:
         gnss, shown, geodetic = self.gnss, self._shown(begin), self.recording.geodetic
         shown = shown[agreeing(gnss, geodetic, shown)]
         given = gnss.velocity is not None and gnss.velocity_std is not None
         origin = gnss.position[shown[0]] if len(shown) else np.zeros(3)
-        return Fixes(
+        return FixSeries(
             time=gnss.time[shown] - begin,
             position=displacement(gnss.position[shown], origin, geodetic),
             position_std=gnss.position_std[shown],
@@ -221,7 +221,7 @@ class Beginning:
         )
 
 
-def _moves(fixes: Fixes) -> bool:
+def _moves(fixes: FixSeries) -> bool:
     """Whether fixes lie farther apart, or give larger velocities, than their noise explains."""
     off = (fixes.position - np.average(fixes.position, axis=0)) / fixes.position_std
     squares = [off[:, :2]]

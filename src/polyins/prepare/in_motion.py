@@ -84,7 +84,7 @@ class MeanImu:
 
 
 @dataclass(frozen=True)
-class Fixes:
+class FixSeries:
     """Fixes of an antenna, m and m/s north, east, down."""
 
     time: Array
@@ -102,7 +102,7 @@ class Fixes:
     gravity: float
     """m/s^2"""
 
-    def until(self, time: float) -> Fixes:
+    def until(self, time: float) -> FixSeries:
         """Return those up to a time, thinned out where they are many."""
         count = int(np.searchsorted(self.time, time, "right"))
         part = slice(0, count, max(1, -(-count // MOST)))
@@ -121,7 +121,7 @@ class Fixes:
 
 
 @dataclass(frozen=True)
-class Known:
+class Prior:
     """What is known at the instant from elsewhere; None: nothing."""
 
     heading: float | None = None
@@ -171,7 +171,7 @@ class Minimum:
 class Search:
     """The minima over ever more fixes, each search beginning where the one before ended."""
 
-    def __init__(self, imu: MeanImu, fixes: Fixes, known: Known = Known()) -> None:
+    def __init__(self, imu: MeanImu, fixes: FixSeries, known: Prior = Prior()) -> None:
         self.imu, self.fixes, self.known = imu, fixes, known
         headings = np.arange(HEADINGS) * 2.0 * np.pi / HEADINGS
         self.lanes = [self._guess(float(h)) for h in ([known.heading] if known.heading is not None else headings)]
@@ -227,7 +227,7 @@ class Search:
 class _Problem:
     """The sum of squares over some fixes."""
 
-    def __init__(self, imu: MeanImu, fixes: Fixes, known: Known) -> None:
+    def __init__(self, imu: MeanImu, fixes: FixSeries, known: Prior) -> None:
         self.imu, self.fixes, self.known = imu, fixes, known
         self.lever = fixes.antenna - imu.point
         covariances = [_covariances(imu, fixes, axis) for axis in range(3)]
@@ -388,7 +388,7 @@ def _in_turn(rotations: Array) -> Array:
     return found
 
 
-def _covariances(imu: MeanImu, fixes: Fixes, axis: int) -> tuple[Array, Array]:
+def _covariances(imu: MeanImu, fixes: FixSeries, axis: int) -> tuple[Array, Array]:
     """Return the covariances of positions, then velocities, of an axis by the noise of the IMUs and of the fixes.
 
     The noise of the IMUs since the instant is in all later fixes: it enters on a grid of instants.

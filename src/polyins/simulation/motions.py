@@ -24,7 +24,7 @@ def _none() -> Array:
 
 
 @dataclass(frozen=True)
-class Waves:
+class Undulation:
     """A mean, a drift, and sines: a curve with all derivatives."""
 
     mean: float = 0.0
@@ -47,7 +47,7 @@ class Waves:
     @classmethod
     def drawn(
         cls, rng: np.random.Generator, sizes: Array, periods: Array, mean: float = 0.0, drift: float = 0.0
-    ) -> Waves:
+    ) -> Undulation:
         """Return waves of some sizes and periods, s, which are drawn within 30 %, with any phase."""
         count = len(sizes)
         stretch = rng.uniform(0.7, 1.3, (2, count))
@@ -69,10 +69,10 @@ class Later:
 
 
 @dataclass(frozen=True)
-class Bank:
+class CoordinatedRoll:
     """The roll of a turn in which nothing pulls sideways, for a speed and small changes of it."""
 
-    heading: Waves
+    heading: Undulation
     speed: float
     """m/s"""
 
@@ -89,7 +89,7 @@ def any_heading(rng: np.random.Generator) -> float:
 def lying(rng: np.random.Generator, duration: float) -> Path:
     """Return an array at rest in any attitude: on its side, nose up, upside down."""
     roll, pitch = rng.uniform(-180.0, 180.0) * DEG, rng.uniform(-75.0, 75.0) * DEG
-    profile = Profile(Waves(), Waves(float(roll)), Waves(float(pitch)), Waves(any_heading(rng)))
+    profile = Profile(Undulation(), Undulation(float(roll)), Undulation(float(pitch)), Undulation(any_heading(rng)))
     return path(profile, duration=duration)
 
 
@@ -119,38 +119,40 @@ def flight(rng: np.random.Generator, duration: float) -> Path:
     speed = float(rng.uniform(12.0, 40.0))
     # banked by 20 degrees
     swing = np.array([0.36 * GRAVITY / speed * 15.0 / (2.0 * np.pi), 0.01])
-    heading = Waves.drawn(rng, swing, np.array([15.0, 2.0]), any_heading(rng))
-    pace = Waves.drawn(rng, speed * np.array([0.1, 0.01]), np.array([20.0, 3.0]), speed)
-    pitch = Waves.drawn(rng, np.array([4.0, 0.5]) * DEG, np.array([18.0, 1.5]))
-    side = Waves.drawn(rng, np.array([0.01 * speed]), np.array([8.0]))
-    return path(Profile(pace, Bank(heading, speed), pitch, heading, side), duration=duration)
+    heading = Undulation.drawn(rng, swing, np.array([15.0, 2.0]), any_heading(rng))
+    pace = Undulation.drawn(rng, speed * np.array([0.1, 0.01]), np.array([20.0, 3.0]), speed)
+    pitch = Undulation.drawn(rng, np.array([4.0, 0.5]) * DEG, np.array([18.0, 1.5]))
+    side = Undulation.drawn(rng, np.array([0.01 * speed]), np.array([8.0]))
+    return path(Profile(pace, CoordinatedRoll(heading, speed), pitch, heading, side), duration=duration)
 
 
 def walk(rng: np.random.Generator, duration: float) -> Path:
     """Return a walk with the sensor in hand: steps, sway, bends."""
     speed, step = float(rng.uniform(0.8, 1.6)), float(rng.uniform(0.5, 0.65))
     bends = np.array([30.0, 3.0]) * DEG
-    heading = Waves.drawn(rng, bends, np.array([25.0, 2.0 * step]), any_heading(rng))
-    pace = Waves.drawn(rng, np.array([0.15, 0.1]), np.array([step, 12.0]), speed)
-    side = Waves.drawn(rng, np.array([0.05]), np.array([2.0 * step]), 0.02 * speed * float(rng.normal()))
-    roll = Waves.drawn(rng, np.array([2.0]) * DEG, np.array([2.0 * step]))
-    pitch = Waves.drawn(rng, np.array([3.0]) * DEG, np.array([step]))
+    heading = Undulation.drawn(rng, bends, np.array([25.0, 2.0 * step]), any_heading(rng))
+    pace = Undulation.drawn(rng, np.array([0.15, 0.1]), np.array([step, 12.0]), speed)
+    side = Undulation.drawn(rng, np.array([0.05]), np.array([2.0 * step]), 0.02 * speed * float(rng.normal()))
+    roll = Undulation.drawn(rng, np.array([2.0]) * DEG, np.array([2.0 * step]))
+    pitch = Undulation.drawn(rng, np.array([3.0]) * DEG, np.array([step]))
     return path(Profile(pace, roll, pitch, heading, side), duration=duration)
 
 
 def hover(rng: np.random.Generator, duration: float) -> Path:
     """Return a hover in gusts: to and fro by half a metre or so, turning slowly, whatever the heading."""
     size = float(rng.uniform(0.1, 0.5))
-    to_and_fro = [Waves.drawn(rng, np.array([size, 0.3 * size]), np.array([6.0, 2.0])) for _ in range(2)]
-    heading = Waves.drawn(rng, np.array([10.0]) * DEG, np.array([15.0]), any_heading(rng))
-    roll, pitch = (Waves.drawn(rng, np.array([3.0, 1.0]) * DEG, np.array([6.0, 2.0])) for _ in range(2))
+    to_and_fro = [Undulation.drawn(rng, np.array([size, 0.3 * size]), np.array([6.0, 2.0])) for _ in range(2)]
+    heading = Undulation.drawn(rng, np.array([10.0]) * DEG, np.array([15.0]), any_heading(rng))
+    roll, pitch = (Undulation.drawn(rng, np.array([3.0, 1.0]) * DEG, np.array([6.0, 2.0])) for _ in range(2))
     return path(Profile(to_and_fro[0], roll, pitch, heading, to_and_fro[1]), duration=duration)
 
 
 def sideways(rng: np.random.Generator, duration: float) -> Path:
     """Return a flight of rotors: it goes where it likes, at some m/s, and looks elsewhere."""
     ahead, aside = rng.normal(0.0, 3.0, 2)
-    speeds = [Waves.drawn(rng, np.array([1.5, 0.3]), np.array([10.0, 3.0]), float(mean)) for mean in (ahead, aside)]
-    heading = Waves.drawn(rng, np.array([15.0]) * DEG, np.array([12.0]), any_heading(rng))
-    roll, pitch = (Waves.drawn(rng, np.array([6.0, 1.0]) * DEG, np.array([8.0, 2.0])) for _ in range(2))
+    speeds = [
+        Undulation.drawn(rng, np.array([1.5, 0.3]), np.array([10.0, 3.0]), float(mean)) for mean in (ahead, aside)
+    ]
+    heading = Undulation.drawn(rng, np.array([15.0]) * DEG, np.array([12.0]), any_heading(rng))
+    roll, pitch = (Undulation.drawn(rng, np.array([6.0, 1.0]) * DEG, np.array([8.0, 2.0])) for _ in range(2))
     return path(Profile(speeds[0], roll, pitch, heading, speeds[1]), duration=duration)

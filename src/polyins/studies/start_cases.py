@@ -64,7 +64,7 @@ DATASHEET = {
 
 
 @dataclass(frozen=True)
-class Case:
+class StartCase:
     """One start."""
 
     number: int
@@ -81,10 +81,10 @@ def _none() -> Array:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class StartOutcome:
     """What became of a start."""
 
-    case: Case
+    case: StartCase
     refused: str = ""
     """why"""
     heading: Array = field(default_factory=_none)
@@ -98,14 +98,14 @@ class Outcome:
     level: str = ""
     """of the verdict"""
 
-    def slim(self) -> Outcome:
+    def slim(self) -> StartOutcome:
         """Return it without the data of the recording."""
         recording = self.case.recording
         empty = replace(recording, imus=(), gnss=None, reference=None)
         return replace(self, case=replace(self.case, recording=empty))
 
 
-def case(number: int) -> Case:
+def case(number: int) -> StartCase:
     """Return the start of that number."""
     rng = np.random.default_rng([number, 15])
     kind = KINDS[number // 2 % len(KINDS)]
@@ -122,20 +122,20 @@ def case(number: int) -> Case:
     count = len(recording.imus)
     array = "single" if count == 1 else str(rng.choice(["enav-fusion", "imu-fusion", "nav-fusion"]))
     method = str(rng.choice(WHEEL_METHODS)) if kind == "wheels" else array
-    return Case(number, kind, method, recording, run.path, given)
+    return StartCase(number, kind, method, recording, run.path, given)
 
 
-def outcome(one: Case) -> Outcome:
+def outcome(one: StartCase) -> StartOutcome:
     """Run a start and compare it with the truth."""
     try:
         solution = batch.run(one.recording, one.method)
     except InputError as error:
-        return Outcome(one, refused=str(error))
+        return StartOutcome(one, refused=str(error))
     phi, variance = errors(solution, one.truth)
     shown = solution.time <= solution.time[0] + WATCHED
     std = np.sqrt(variance[shown])
     span = one.recording.imus[0].time
-    return Outcome(
+    return StartOutcome(
         one,
         heading=np.abs(phi[shown, 2]),
         heading_std=std[:, 2],

@@ -22,7 +22,7 @@ from polyins.reading import datasets
 from polyins.screen import number, print_table
 from polyins.studies import flights
 from polyins.studies.progress import Steps
-from polyins.studies.start_cases import KINDS, Outcome, case, outcome
+from polyins.studies.start_cases import KINDS, StartOutcome, case, outcome
 from polyins.tools.parallel import Progress, run_all
 
 Array = NDArray[np.float64]
@@ -72,19 +72,19 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     return document
 
 
-def outcomes_of(numbers: Sequence[int], progress: Progress | None = None) -> list[Outcome]:
+def outcomes_of(numbers: Sequence[int], progress: Progress | None = None) -> list[StartOutcome]:
     """Run starts by number, on all cores."""
     return run_all([partial(_outcome, each) for each in numbers], progress=progress)
 
 
-def _outcome(each: int, progress: Progress) -> Outcome:
+def _outcome(each: int, progress: Progress) -> StartOutcome:
     found = outcome(case(each))
     progress(1.0)
     # the recordings of hundreds of cases fill the memory
     return found.slim()
 
 
-def table(outcomes: Sequence[Outcome]) -> dict[str, Row]:
+def table(outcomes: Sequence[StartOutcome]) -> dict[str, Row]:
     """Return the figures of each kind, and of all."""
     groups = {kind: [one for one in outcomes if one.case.kind == kind] for kind in KINDS}
     return {name: _row(group) for name, group in {**groups, "all": list(outcomes)}.items() if group}
@@ -95,7 +95,7 @@ def is_wrong(heading: Array, std: Array) -> bool:
     return bool(np.any((heading > OFF) & (std < SURE)))
 
 
-def _row(outcomes: Sequence[Outcome]) -> Row:
+def _row(outcomes: Sequence[StartOutcome]) -> Row:
     started = [one for one in outcomes if not one.refused]
     ratios = [one.heading / one.heading_std for one in started]
     levelled = [one.tilt for one in started if len(one.tilt)]

@@ -45,7 +45,7 @@ HEADING_RATE_HZ = 1.0
 
 
 @dataclass(frozen=True)
-class Source:
+class LogSource:
     """One stream, and where it is."""
 
     path: str | Path
@@ -133,9 +133,9 @@ def assumptions(proposal: str) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _sources(paths: Sequence[str | Path]) -> tuple[list[Source], list[str]]:
+def _sources(paths: Sequence[str | Path]) -> tuple[list[LogSource], list[str]]:
     """Return the streams that can be used, and why others are not; raises InputError if no file is readable."""
-    found: list[Source] = []
+    found: list[LogSource] = []
     left_out: list[str] = []
     refused: list[InputError] = []
     for path in paths:
@@ -143,12 +143,14 @@ def _sources(paths: Sequence[str | Path]) -> tuple[list[Source], list[str]]:
             if log_format(path) is not None:
                 log = read_log(path)
                 found += [
-                    Source(path, rows, (), name, log) for name, rows in log.streams.items() if name not in log.unusable
+                    LogSource(path, rows, (), name, log)
+                    for name, rows in log.streams.items()
+                    if name not in log.unusable
                 ]
                 left_out += [f"{path}: {name} is not used: {why}" for name, why in log.unusable.items()]
                 left_out += [f"{path}: {note}" for note in log.notes]
             else:
-                found.append(Source(path, *read_stream(path)))
+                found.append(LogSource(path, *read_stream(path)))
         except InputError as error:
             refused.append(error)
     if refused and not found:
@@ -161,7 +163,7 @@ def _comments(texts: Sequence[str]) -> list[str]:
     return [f"{CHECK} {text}" for text in texts]
 
 
-def _start_line(gnss: bool, tracks: list[Source], headings: list[Source]) -> str:
+def _start_line(gnss: bool, tracks: list[LogSource], headings: list[LogSource]) -> str:
     """Return where the heading comes from: of what a start needs, the one thing that data at rest do not tell."""
     if headings:
         return f"  heading_from: auto  {CHECK} that of {headings[0].stream}; else heading_deg"
@@ -172,11 +174,11 @@ def _start_line(gnss: bool, tracks: list[Source], headings: list[Source]) -> str
     return f"  heading_deg: 0.0  {CHECK} clockwise from north; no file tells it"
 
 
-def _sensors(read: Sequence[Source], kind: str) -> list[Source]:
+def _sensors(read: Sequence[LogSource], kind: str) -> list[LogSource]:
     return [one for one in read if isinstance(one.rows, SensorRows) and one.rows.kind == kind]
 
 
-def _imu_lines(number: int, imu: Source, speeds: list[Source]) -> list[str]:
+def _imu_lines(number: int, imu: LogSource, speeds: list[LogSource]) -> list[str]:
     assert isinstance(imu.rows, ImuRows)
     facts = describe(imu.rows)
     lines = [f"  - name: imu{number}", f"    file: {_quoted(imu.path)}", *_format_lines(imu, "    ")]
@@ -227,7 +229,7 @@ def shaking(rows: ImuRows) -> tuple[float, float]:
     return sizes[0], sizes[1]
 
 
-def _axes_lines(imu: Source, facts: dict[str, Any], speeds: list[Source]) -> list[str]:
+def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) -> list[str]:
     if imu.log is not None and imu.log.upright:
         return ["    axes: [x, y, z]  # forward, right, down, as the format has them"]
     force = np.array(facts["accel_mean_m_s2"] or [0.0, 0.0, -9.8], dtype=float)
@@ -267,7 +269,7 @@ def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, fl
     return best, correlation, correlation * float(np.sqrt(len(gained)))
 
 
-def _odometer_lines(of: Source) -> list[str]:
+def _odometer_lines(of: LogSource) -> list[str]:
     return [
         f"  file: {_quoted(of.path)}",
         f"  stream: {_quoted(of.stream)}",
@@ -277,7 +279,7 @@ def _odometer_lines(of: Source) -> list[str]:
     ]
 
 
-def _format_lines(of: Source, indent: str) -> list[str]:
+def _format_lines(of: LogSource, indent: str) -> list[str]:
     if of.log is not None:
         return [f"{indent}stream: {_quoted(of.stream)}"]
     kind = data_format(of.path)
@@ -291,7 +293,7 @@ def _format_lines(of: Source, indent: str) -> list[str]:
     return lines
 
 
-def _track_lines(section: str, of: Source, span: tuple[float, float]) -> list[str]:
+def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list[str]:
     track = of.rows
     assert isinstance(track, Track)
     facts = describe(track)
@@ -314,7 +316,7 @@ def _track_lines(section: str, of: Source, span: tuple[float, float]) -> list[st
     return lines
 
 
-def _clock_line(of: Source, span: tuple[float, float]) -> str:
+def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
     time = of.rows.time
     if of.log is not None and of.log.fix_age is not None:
         return f"  clock_offset_s: {-of.log.fix_age:g}  {CHECK} how old fixes are when they are stamped, by the log"
@@ -326,7 +328,7 @@ def _clock_line(of: Source, span: tuple[float, float]) -> str:
     return f"  clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s"
 
 
-def _heading_lines(of: Source) -> list[str]:
+def _heading_lines(of: LogSource) -> list[str]:
     return [
         f"  file: {_quoted(of.path)}",
         f"  stream: {_quoted(of.stream)}",
