@@ -25,6 +25,8 @@ NOISY = 4.0
 """times the noise of the quieter quarter"""
 DOUBTFUL = 10.0
 """times the noise of the whole array, from which its solution is less sure than stated"""
+LEAST_STATED = 1e-9
+"""rad/s and m/s^2: of an IMU without noise"""
 OF_MEAN = np.sqrt(np.pi / 2.0) / np.sqrt(6.0)
 """std of one value by the mean size of the second difference of three"""
 GYRO, ACCEL = slice(0, 3), slice(3, 6)
@@ -40,15 +42,13 @@ def noisy(rig: Rig, blocks: Blocks) -> tuple[Finding, ...]:
 def _of_sensor(rig: Rig, blocks: Blocks, sensor: slice) -> Iterator[Finding]:
     parts = blocks.parts(PART_S)
     density = [imu.noise.angle_random_walk if sensor == GYRO else imu.noise.velocity_random_walk for imu in rig.imus]
-    stated = np.sqrt(np.mean(np.square(density), axis=1) / blocks.interval)
+    stated = np.maximum(np.sqrt(np.mean(np.square(density), axis=1) / blocks.interval), LEAST_STATED)
     shown = np.array([_shown(blocks.rates[part, sensor]) for part in parts])
-    shown[np.array([blocks.whole[part].mean(axis=0) for part in parts]) < 0.9] = np.nan
-    ratio = shown / np.where(stated > 0.0, stated, np.nan)
-    with np.errstate(invalid="ignore"):
-        times = ratio / np.nanquantile(ratio, 0.25, axis=1, keepdims=True)
+    shown[np.array([blocks.whole[part].mean(axis=0) for part in parts]) < 0.9] = 0.0
+    times = np.array([_over_others(row / stated) for row in shown])
     over = times > NOISY
     lasting = np.array([over[k : k + LASTING].all(axis=0) for k in range(max(len(parts) - LASTING, 0) + 1)]).any(axis=0)
-    doubtful = bool(np.any(np.sqrt(np.nanmean(np.square(times), axis=1)) > DOUBTFUL))
+    doubtful = bool(np.any(np.sqrt(np.mean(np.square(times), axis=1)) > DOUBTFUL))
     for i in np.flatnonzero(lasting):
         rows = np.flatnonzero(over[:, i])
         begin = float(blocks.time[parts[rows[0]]][0])
@@ -67,6 +67,12 @@ def _of_sensor(rig: Rig, blocks: Blocks, sensor: slice) -> Iterator[Finding]:
             expected=1.0,
             remedy="leave it out, or state its noise",
         )
+
+
+def _over_others(ratio: Array) -> Array:
+    """Return noise over that of the quieter quarter, (N,), of noise over what figures say; 0: they explain it."""
+    known = ratio[ratio > 0.0]
+    return np.where(ratio > 1.0, ratio / np.quantile(known, 0.25), 0.0) if known.size else ratio
 
 
 def _shown(rates: Array) -> Array:
