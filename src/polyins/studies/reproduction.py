@@ -135,6 +135,7 @@ def _leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:
         for key, item in value.items():
             yield from _leaves(item, f"{path} / {key}" if path else str(key))
     elif isinstance(value, list):
-        yield path, ", ".join(number(item) for item in value)
+        if not any(isinstance(item, str) for item in value):
+            yield path, ", ".join(number(item) for item in value)
     elif not isinstance(value, str):
         yield path, str(value) if isinstance(value, int) else number(value if isinstance(value, float) else None, 3)

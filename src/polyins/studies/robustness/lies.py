@@ -113,7 +113,12 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     seeds = SEEDS[: 1 if quick else None]
     rows = run_all([partial(_row, lie, seeds) for lie in LIES], progress=progress)
     settings = {"seeds": list(seeds), "method": METHOD, "begins_s": AT, "later_s": LATER, "followed_s": FOLLOWED}
-    return {"target": "lies", "paper": {}, "polyins": plain({"lies": rows}), "settings": settings}
+    return {
+        "target": "lies",
+        "paper": {},
+        "polyins": plain(dict(zip([lie.name for lie in LIES], rows, strict=True))),
+        "settings": settings,
+    }
 
 
 def _row(lie: Lie, seeds: tuple[int, ...], progress: Callable[[float], None]) -> dict[str, Any]:
@@ -121,7 +126,7 @@ def _row(lie: Lie, seeds: tuple[int, ...], progress: Callable[[float], None]) ->
     told = [told_lie(lie, seed) for seed in seeds]
     progress(1.0)
     known = [one for one in told if "refused" not in one]
-    row: dict[str, Any] = {"lie": lie.name, "refused": len(told) - len(known)}
+    row: dict[str, Any] = {"refused": len(told) - len(known)}
     for key in ("horizontal_max_m", "heading_max_deg", "later_max_m"):
         row[key] = max((one[key] for one in known), default=None)
     row["named"] = sorted({kind for one in told for kind in one["named"]})
@@ -155,12 +160,12 @@ def print_tables(figures: Mapping[str, Any]) -> None:
     """Print a row for each lie."""
     rows = [
         [
-            one["lie"],
+            name,
             "refused" if one["horizontal_max_m"] is None else number(one["horizontal_max_m"], 2),
             number(one["heading_max_deg"], 2),
             number(one["later_max_m"], 2),
             ", ".join(one["named"]),
         ]
-        for one in figures["lies"]
+        for name, one in figures.items()
     ]
     print_table("lies of GNSS", ["lie", "largest error, m", "of heading, deg", "later, m", "named"], rows)

@@ -71,13 +71,13 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     return {
         "target": "robustness",
         "paper": {},
-        "polyins": plain({"cases": [_document(row) for row in rows], "summary": summary(rows, false)}),
+        "polyins": plain({"cases": {row.name: _document(row) for row in rows}, "summary": summary(rows, false)}),
         "settings": {"seeds": list(SEEDS), "costs": COSTS, "harmless": HARMLESS, "covered": COVERED, "wrong": WRONG},
     }
 
 
 def _document(row: Row) -> dict[str, Any]:
-    return asdict(row)
+    return {key: value for key, value in asdict(row).items() if key != "name"}
 
 
 def _judged(case: Case, progress: Callable[[float], None]) -> Row:
@@ -169,14 +169,14 @@ def print_tables(figures: Mapping[str, Any]) -> None:
     """Print a row for each case, then the sums."""
     rows = [
         [
-            one["name"],
+            name,
             one["method"],
             number(one["error_ratio"], 3),
             number(one["error_over_std"], 3),
             one["verdict"],
             "yes" if one["named"] else "no",
         ]
-        for one in figures["cases"]
+        for name, one in figures["cases"].items()
     ]
     print_table("robustness", ["fault", "method", "error ratio", "error over std", "verdict", "named"], rows)
     print_table("of all", ["figure", "value"], [[key, number(value)] for key, value in figures["summary"].items()])
