@@ -6,6 +6,7 @@ Nothing else depends on what is here: where Numba has changed, `jit` compiles by
 
 from __future__ import annotations
 
+import gc
 import importlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -59,6 +60,19 @@ def _looked_up_once() -> Iterator[None]:
 
 
 _FOUND: dict[Any, Any] = {}
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Look for no garbage: almost all that Numba makes it keeps, and to look through all of it takes long."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
 
 PASSES = (
     untyped_passes.TranslateByteCode,
@@ -137,7 +151,7 @@ class EntryCompiler(_Compiler):
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function."""
-        with _looked_up_once():
+        with _looked_up_once(), _without_collection():
             return super().compile_extra(func)  # type: ignore[no-untyped-call]
 
 
