@@ -12,6 +12,7 @@ An HTML comment before a fenced block says how to treat it:
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -342,6 +343,10 @@ def section(title: str) -> str:
 
 
 COMMANDS = cli.cli.commands
+SOURCES = Path(pi.__file__).parents[1]
+MODULES = {
+    file: ".".join(file.relative_to(SOURCES).with_suffix("").parts) for file in Path(pi.__file__).parent.rglob("*.py")
+}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -357,6 +362,30 @@ def test_every_command_and_option_is_listed(name: str) -> None:
             assert f"| `{p.opts[0]}` | `{p.default}`" in text
     for sub in getattr(command, "commands", {}):
         assert re.search(rf"`polyins\s{name}\s{sub}\b", text)
+
+
+def kinds_of_findings() -> set[str]:
+    """What stands first in every call of `Finding`; names of kinds are those of upper case with a value beside them."""
+    found: set[str] = set()
+    for file in Path(pi.__file__).parent.rglob("*.py"):
+        for call in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if (
+                isinstance(call, ast.Call)
+                and isinstance(call.func, ast.Name)
+                and call.func.id == "Finding"
+                and call.args
+            ):
+                kind = call.args[0]
+                if isinstance(kind, ast.Name) and kind.id.isupper():
+                    found.add(getattr(import_module(MODULES[file]), kind.id))
+                found |= {one.value for one in ast.walk(kind) if isinstance(one, ast.Constant)}
+    return found
+
+
+def test_every_kind_of_finding_is_listed() -> None:
+    listed = set(re.findall(r"^\| `([a-z ]+)` \|", section("### Kinds of findings"), flags=re.M))
+    # those that are made from sentences
+    assert listed == kinds_of_findings() | {"data", "point"}
 
 
 def test_every_target_and_method_is_listed() -> None:

@@ -1,7 +1,6 @@
 """Whether a solution can be trusted, judged without a reference from what the filter saw of its own measurements.
 
-A standard deviation is a promise: where innovations are three times larger than stated, or follow one another with one
-sign, it is not kept.
+A standard deviation is a promise: where innovations are three times larger than stated it is not kept.
 """
 
 from __future__ import annotations
@@ -34,8 +33,6 @@ PART = 10
 """parts of a run of which the worst is judged: a fault need not last"""
 REJECTED_DOUBT, REJECTED_SERIOUS = 0.2, 0.7
 """share of measurements that the gate did not take as they are"""
-CORRELATED = 0.8
-"""of neighbouring innovations, from which they tell of a bias: white ones have none"""
 LEAST_COVERAGE = 0.99
 NEGLIGIBLE_SHARE = 0.01
 NEGLIGIBLE_S = 1.0
@@ -52,8 +49,6 @@ class _Statistics:
     """the same, of the worst part"""
     worst_from: float
     worst_to: float
-    correlation: float
-    """of neighbours"""
     rejected: float
     """share"""
 
@@ -195,19 +190,8 @@ def _statistics(measured: Innovations) -> _Statistics:
         worst=float(by_part.max()),
         worst_from=float(measured.time[worst[0]]),
         worst_to=float(measured.time[worst[-1]]),
-        correlation=_correlation(measured),
         rejected=float(np.mean(~measured.accepted)),
     )
-
-
-def _correlation(measured: Innovations) -> float:
-    """Return the correlation of neighbouring innovations, of the axis where it is largest."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scaled = np.where(measured.std > 0.0, measured.residual / measured.std, 0.0)
-    limited = np.clip(scaled, -USELESS, USELESS)
-    power = np.sum(limited**2, axis=0)
-    products = np.sum(limited[1:] * limited[:-1], axis=0)
-    return float(np.max(products / np.maximum(power, 1.0)))
 
 
 def _worst_axis(measured: Innovations, of: _Statistics) -> str | None:

@@ -16,6 +16,8 @@ from polyins.model.findings import Finding
 from polyins.model.rig import DEG, Rig, Vector, zero_vector
 
 Array = NDArray[np.float64]
+Rows = slice | NDArray[np.bool_] | NDArray[np.intp]
+"""which rows of a stream"""
 
 
 USUAL_OF = 10_000
@@ -44,6 +46,10 @@ class ImuStream:
         """Nominal rate: one over the median interval."""
         return float(1.0 / np.median(np.diff(self.time)))
 
+    def at(self, rows: Rows) -> ImuStream:
+        """Return some of the rows."""
+        return ImuStream(self.name, self.time[rows], self.dtheta[rows], self.dvel[rows])
+
 
 @dataclass(frozen=True)
 class GnssStream:
@@ -59,6 +65,15 @@ class GnssStream:
     """m/s north, east, down, shape (M, 3)"""
     velocity_std: Array | None = None
     """m/s, shape (M, 3)"""
+
+    def at(self, rows: Rows) -> GnssStream:
+        """Return some of the fixes."""
+
+        def of(values: Array | None) -> Array | None:
+            return None if values is None else values[rows]
+
+        stds = self.position_std[rows], of(self.velocity), of(self.velocity_std)
+        return GnssStream(self.time[rows], self.position[rows], *stds)
 
 
 @dataclass(frozen=True)

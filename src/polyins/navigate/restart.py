@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.model.findings import Finding, Severity
-from polyins.model.recording import GnssStream, ImuStream, Recording, StartOptions
+from polyins.model.recording import Recording, StartOptions
 from polyins.model.rig import Imu, ImuErrors
 from polyins.model.solution import Solution
 from polyins.navigate.bridging import TURN_RATE
@@ -260,22 +260,11 @@ def as_lost(start: Start, before: Known) -> Start:
 
 def part_of(recording: Recording, begin: float, end: float, pause: Pause | None) -> Recording:
     """Return the recording with the data after one time and up to another, s; `pause`: that before it."""
-    streams = []
-    for stream in recording.imus:
-        kept = slice(*np.searchsorted(stream.time, [begin, end], "right"))
-        streams.append(ImuStream(stream.name, stream.time[kept], stream.dtheta[kept], stream.dvel[kept]))
+    streams = [one.at(slice(*np.searchsorted(one.time, [begin, end], "right"))) for one in recording.imus]
     gnss = recording.gnss
     if gnss is not None and pause is not None:
-        gnss = _fixes(gnss, gnss.time >= pause[1])
+        gnss = gnss.at(gnss.time >= pause.end)
     return replace(recording, imus=tuple(streams), gnss=gnss)
-
-
-def _fixes(gnss: GnssStream, kept: NDArray[np.bool_]) -> GnssStream:
-    def of(values: Array | None) -> Array | None:
-        return None if values is None else values[kept]
-
-    stds = gnss.position_std[kept]
-    return GnssStream(gnss.time[kept], gnss.position[kept], stds, of(gnss.velocity), of(gnss.velocity_std))
 
 
 def _with_errors(imu: Imu, errors: Array, std: Array) -> Imu:

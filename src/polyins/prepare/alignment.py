@@ -316,7 +316,7 @@ class _Search:
             shown = self.recording.gnss.time[(self.recording.gnss.time >= after) & (self.recording.gnss.time <= last)]
             std = float(self.error_std[bodies, :3].mean()) / np.sqrt(len(bodies)) if bodies else 0.0
             if len(shown) > 1:
-                gnss = without_rows_after(self.recording.gnss, float(last))
+                gnss = self.recording.gnss.at(self.recording.gnss.time <= last)
                 turned = self._turning(after, shown, still)
                 bias_std = 0.1 * std if still else std
                 found = find_motion(gnss, self.recording.geodetic, turned, bias_std, after)
@@ -756,18 +756,6 @@ def as_noisy_as_at_rest(gnss: GnssStream, geodetic: bool, begin: float, end: flo
         return gnss
     std = gnss.position_std
     return replace(gnss, position_std=np.where(shown > 2.0 * std, np.maximum(std, shown), std))
-
-
-def without_rows_after(gnss: GnssStream, time: float) -> GnssStream:
-    """Return the fixes up to a time, s."""
-    kept = gnss.time <= time
-
-    def of(values: Array | None) -> Array | None:
-        return None if values is None else values[kept]
-
-    return GnssStream(
-        gnss.time[kept], gnss.position[kept], gnss.position_std[kept], of(gnss.velocity), of(gnss.velocity_std)
-    )
 
 
 def level(force: Array, acceleration: Array | None = None, heading: float = 0.0) -> tuple[float, float]:

@@ -19,12 +19,9 @@ def of_data(recording: Recording, aligned: Aligned, end: float) -> tuple[Finding
     `aligned`: the IMUs of the recording, or the beginning of what they measured; `end`: of all of it, s. Raises
     InputError as `delays` does.
     """
-    rig, gnss, blocks = recording.rig, recording.gnss, Blocks.of(aligned)
+    rig, gnss = recording.rig, recording.gnss
     fixes = () if gnss is None else of_fixes(gnss, recording.geodetic, end)
-    return (
-        *disagreements(rig, aligned),
-        *of_turning(rig, aligned),
-        *noisy(rig, blocks),
-        *delays(recording, blocks),
-        *fixes,
-    )
+    if rig.has_wheels:
+        return (*of_turning(rig, aligned), *fixes)
+    blocks = Blocks.of(aligned)
+    return (*disagreements(rig, aligned), *noisy(rig, blocks), *delays(recording, blocks), *fixes)

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from polyins.model.findings import Finding
 from polyins.model.rig import Rig
 from polyins.prepare.blocks import Blocks
+from polyins.prepare.votes import lasting
 
 Array = NDArray[np.float64]
 
 PART_S = 20.0
 """s in which noise is told"""
-LASTING = 2
-"""parts in a row"""
 NOISY = 4.0
 """times the noise of the quieter quarter"""
 DOUBTFUL = 10.0
@@ -47,9 +46,8 @@ def _of_sensor(rig: Rig, blocks: Blocks, sensor: slice) -> Iterator[Finding]:
     shown[np.array([blocks.whole[part].mean(axis=0) for part in parts]) < 0.9] = 0.0
     times = np.array([_over_others(row / stated) for row in shown])
     over = times > NOISY
-    lasting = np.array([over[k : k + LASTING].all(axis=0) for k in range(max(len(parts) - LASTING, 0) + 1)]).any(axis=0)
     doubtful = bool(np.any(np.sqrt(np.mean(np.square(times), axis=1)) > DOUBTFUL))
-    for i in np.flatnonzero(lasting):
+    for i in np.flatnonzero(lasting(over)):
         rows = np.flatnonzero(over[:, i])
         begin = float(blocks.time[parts[rows[0]]][0])
         end, size = float(blocks.time[parts[rows[-1]]][-1]), float(np.median(times[rows, i]))

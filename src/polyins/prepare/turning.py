@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from polyins.model.findings import Finding
 from polyins.model.rig import DEG, Rig
 from polyins.prepare.timesync import Aligned
-from polyins.prepare.votes import DIFFERS, LASTING, SIGMAS
+from polyins.prepare.votes import DIFFERS, LASTING, SIGMAS, lasting
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -90,7 +90,7 @@ def _differing(rig: Rig, turn: Array, edges: Array) -> Iterator[Finding]:
     allowed = LEAST + SHARE * np.abs(middle)[:, None] + SIGMAS * walk / np.sqrt(WINDOW)
     two = known.any(axis=0).sum() == 2
     over = np.abs(turn - middle[:, None]) * (2.0 if two else 1.0) > allowed
-    for i in np.flatnonzero(_lasting(over)):
+    for i in np.flatnonzero(lasting(over)):
         rows, size = np.flatnonzero(over[:, i]), turn - middle[:, None]
         others = [imu.name for k, imu in enumerate(rig.imus) if known[:, k].any() and k != i]
         named = [rig.imus[i].name, *others] if two else [rig.imus[i].name]
@@ -109,16 +109,11 @@ def _differing(rig: Rig, turn: Array, edges: Array) -> Iterator[Finding]:
 def _changing(rig: Rig, change: Array, edges: Array) -> Iterator[Finding]:
     """Return in which wheels what is constant is by so much, (W, N), not what it is most of the time."""
     over = change > LEAST_CHANGE
-    for i in np.flatnonzero(_lasting(over)):
+    for i in np.flatnonzero(lasting(over)):
         rows, name = np.flatnonzero(over[:, i]), rig.imus[i].name
         size = float(np.median(change[rows, i])) / DEG
         text = f"IMU {name}: what its gyro shows across the axle changes by {size:.2g} deg/s"
         yield _finding([name], text, (edges[rows[0]], edges[rows[-1] + 1]), size)
-
-
-def _lasting(over: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which columns of (W, N) are true in so many rows that follow one another."""
-    return np.asarray(np.any([over[k : k + LASTING].all(axis=0) for k in range(len(over) - LASTING + 1)], axis=0))
 
 
 def _finding(names: list[str], text: str, when: tuple[float, float], size: float) -> Finding:

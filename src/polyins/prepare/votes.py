@@ -126,6 +126,12 @@ def _mount_of(rig: Rig, aligned: Aligned, finding: Finding) -> Finding | None:
     return named and replace(named, from_s=finding.from_s, to_s=finding.to_s)
 
 
+def lasting(over: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which columns of (W, N) are true in `LASTING` rows in a row, or in all if there are fewer."""
+    count = min(LASTING, len(over))
+    return np.asarray(np.any([over[k : k + count].all(axis=0) for k in range(len(over) - count + 1)], axis=0))
+
+
 def _std(rig: Rig, middle: Array) -> Array:
     """Return how far each IMU may be from the median by what is known of it, shape (W, 6, N)."""
     known = np.array([imu.start_std() for imu in rig.imus])
@@ -147,10 +153,10 @@ def _unmodelled(middle: Array) -> Array:
 def _found(rig: Rig, off: Array, over: Array, edges: Array) -> Iterator[Finding]:
     pair = len(rig.imus) == 2
     for i, imu in enumerate(rig.imus[:1] if pair else rig.imus):
-        lasting = np.min([over[k : len(over) - LASTING + 1 + k, :, i] for k in range(LASTING)], axis=0)
-        if not (lasting > 1.0).any():
+        least = np.min([over[k : len(over) - LASTING + 1 + k, :, i] for k in range(LASTING)], axis=0)
+        if not (least > 1.0).any():
             continue
-        axis = int(np.argmax(lasting.max(axis=0)))
+        axis = int(np.argmax(least.max(axis=0)))
         rows = np.flatnonzero(over[:, axis, i] > 1.0)
         size = float(np.median(off[rows, axis, i])) * (2.0 if pair else 1.0)
         gyro = axis < 3

@@ -94,17 +94,11 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         warnings.append(f"{track.source.path}: heights of the solution are above {datum}")
     track = _converted(track, entry, document)
     kept = thinned(track.time, entry.rate_hz) if entry.rate_hz else np.arange(len(track.time))
-    velocity = track.velocity if track.velocity_std is not None else None
-    if track.velocity is not None and velocity is None:
+    velocities = (None, None) if track.velocity is None else (track.velocity, track.velocity_std)
+    if track.velocity is not None and track.velocity_std is None:
         warnings.append(f"{track.source.path}: GNSS velocity has no std and is not used")
-    stream = GnssStream(
-        track.time[kept],
-        track.position[kept],
-        std[kept],
-        None if velocity is None else velocity[kept],
-        None if velocity is None or track.velocity_std is None else track.velocity_std[kept],
-    )
-    return stream, track.geodetic, warnings
+        velocities = None, None
+    return GnssStream(track.time, track.position, std, *velocities).at(kept), track.geodetic, warnings
 
 
 def _converted(track: Track, entry: GnssEntry, document: Document) -> Track:

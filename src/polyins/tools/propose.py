@@ -269,10 +269,13 @@ def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, fl
     return best, correlation, correlation * float(np.sqrt(len(gained)))
 
 
+def _place_lines(of: LogSource) -> list[str]:
+    return [f"  file: {_quoted(of.path)}", f"  stream: {_quoted(of.stream)}"]
+
+
 def _odometer_lines(of: LogSource) -> list[str]:
     return [
-        f"  file: {_quoted(of.path)}",
-        f"  stream: {_quoted(of.stream)}",
+        *_place_lines(of),
         f"  std_m_s: 0.1  {CHECK} slip is what makes a wheel's speed wrong, not what the log states",
         f"  scale_std: 0.05  {CHECK} of a constant part of its error",
         f"  position_m: [0, 0, 0]  {CHECK} between the wheels: forward, right, down from the array's origin, m",
@@ -330,8 +333,7 @@ def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
 
 def _heading_lines(of: LogSource) -> list[str]:
     return [
-        f"  file: {_quoted(of.path)}",
-        f"  stream: {_quoted(of.stream)}",
+        *_place_lines(of),
         f"  std_deg: {HEADING_STD_DEG:g}  {CHECK} the log does not tell how good this heading is",
         f"  offset_std_deg: {HEADING_STD_DEG:g}  {CHECK} of a constant part of its error",
         f"  rate_hz: {HEADING_RATE_HZ:g}  # its errors last",

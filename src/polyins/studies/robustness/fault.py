@@ -80,8 +80,7 @@ def with_imu(recording: Recording, index: int, stream: ImuStream) -> Recording:
 
 def with_rows(recording: Recording, index: int, kept: Mask) -> Recording:
     """Return the recording with just some rows of one IMU."""
-    stream = recording.imus[index]
-    return with_imu(recording, index, ImuStream(stream.name, stream.time[kept], stream.dtheta[kept], stream.dvel[kept]))
+    return with_imu(recording, index, recording.imus[index].at(kept))
 
 
 def with_gnss(recording: Recording, **changes: Array) -> Recording:
@@ -91,10 +90,7 @@ def with_gnss(recording: Recording, **changes: Array) -> Recording:
 
 def with_fixes(recording: Recording, kept: Mask) -> Recording:
     """Return the recording with just some of its fixes."""
-    stream = fixes(recording)
-    return with_gnss(
-        recording, time=stream.time[kept], position=stream.position[kept], position_std=stream.position_std[kept]
-    )
+    return replace(recording, gnss=fixes(recording).at(kept))
 
 
 def fixes(recording: Recording) -> GnssStream:
