@@ -31,6 +31,7 @@ from polyins.navigate.state import Further, Inputs, Navigators, Outputs, Plan, S
 from polyins.prepare import alignment, rigid, timesync, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.data_findings import of_data
+from polyins.prepare.radii import of_radii
 from polyins.prepare.timesync import Aligned
 
 Array = NDArray[np.float64]
@@ -137,7 +138,7 @@ def run(
 
     parts = restart.parts_of(recording, restart.pauses(of_them))
     whole = Solution.joined(list(restart.run_parts(parts, of_part, restart.rest_of)))
-    return replace(whole, recording_span=_span(of_them))
+    return replace(whole, recording_span=_span(of_them), findings=(*whole.findings, *of_radii(recording)))
 
 
 def known(run: Prepared, last: int, *, broken: bool = False) -> restart.Known:
