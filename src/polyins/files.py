@@ -105,6 +105,13 @@ def write_bytes(path: str | Path, content: bytes) -> None:
         beside.write_bytes(gzip.compress(content, mtime=0) if Path(path).suffix == ".gz" else content)
 
 
+def new_file(path: str | Path) -> Path:
+    """Return the path of a file, or folder, that is to be made; raises InputError if there is one."""
+    if Path(path).exists():
+        raise InputError(f"{path}: exists; expected the name of a new one")
+    return Path(path)
+
+
 def plain_suffix(path: str | Path) -> str:
     """Return the suffix in lower case, that under `.gz` for a packed file: `.csv` for `a.csv.gz`."""
     path = Path(path)
