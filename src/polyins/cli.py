@@ -546,11 +546,12 @@ def info(files: tuple[Path, ...], as_json: bool) -> None:
 @cli.command()
 @click.argument("source", metavar="IN", type=FILE)
 @click.argument("target", metavar="OUT", type=FILE)
-def convert(source: Path, target: Path) -> None:
-    """Convert a data file; the formats follow from content (IN) and suffix (OUT)."""
+@click.option("--stream", default=None, help="Of a log of several: the one that is written.")
+def convert(source: Path, target: Path, stream: str | None) -> None:
+    """Convert a data file; formats follow from content (IN) and suffix (OUT: of a log, a folder has none)."""
     from polyins.tools.convert import convert as convert_file
 
-    for text in convert_file(source, target):
+    for text in convert_file(source, target, stream):
         say(f"warning: {text}")
     say(f"written: {target}")
 
