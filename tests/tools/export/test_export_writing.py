@@ -68,6 +68,21 @@ def test_stamps_that_look_like_unix_time_are_said_to_be_taken_for_it(tmp_path: P
     assert "taken for Unix time, which begins at 2023-11-14 22:30:00 UTC" in note
 
 
+@pytest.mark.parametrize(
+    ("to", "heights", "said"),
+    [
+        ("gpx", "ellipsoidal", "above the ellipsoid, GPX 1.1 has them above the sea; elevations are left out; --geoid"),
+        ("kml", "unknown", "what heights count from is not known; the track lies on the ground"),
+        ("geojson", "sea-level", "above the sea, GeoJSON has them above the ellipsoid; coordinates are without them"),
+        ("mcap", "sea-level", "fixes are without altitude; --geoid-height M converts them"),
+    ],
+)
+def test_heights_that_a_format_has_no_place_for_are_said(to: str, heights: str, said: str, tmp_path: Path) -> None:
+    _, made = known(heights=heights)
+    (note,) = export(made, tmp_path / "out", to)
+    assert said in note
+
+
 def test_rows_without_a_state_are_left_out_and_counted(tmp_path: Path) -> None:
     truth, _ = known()
     status = np.full(truth.time.size, TRACKING, dtype=np.uint8)

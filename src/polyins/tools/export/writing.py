@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any, Literal, cast
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from polyins.model.status import ALIGNING, ATTITUDE_ONLY, NOT_TO_BE_USED
 from polyins.reading.position_stream import thinned
 from polyins.tools.export.trace import Trace, trace_of
 
-ABOVE_SEA = "are not known above the sea; --geoid-height M makes them so"
+Datum = Literal["the sea", "the ellipsoid"]
 
 
 @dataclass(frozen=True)
@@ -38,18 +38,20 @@ class ExportFormat:
     """it holds latitude and longitude only"""
     utc: bool = False
     """it holds times of day only"""
-    height_unknown: str = ""
-    """what becomes of heights that are not known above the sea; empty: it needs none"""
+    above: Datum | None = None
+    """what its heights count from; None: it says so, or they do not matter"""
+    otherwise: str = ""
+    """what becomes of heights that are not known above that"""
 
 
 EXPORTS: tuple[ExportFormat, ...] = (
     ExportFormat("tum", "TUM trajectory", "poses:write_tum"),
     ExportFormat("kitti", "KITTI poses", "poses:write_kitti"),
-    ExportFormat("kml", "KML", "kml:write", True, True, "the track lies on the ground"),
-    ExportFormat("geojson", "GeoJSON", "geojson:write", True),
-    ExportFormat("gpx", "GPX 1.1", "gpx:write", True, True, "elevations are left out"),
-    ExportFormat("nmea", "NMEA 0183", "nmea:write", True, True, "heights are left out"),
-    ExportFormat("mcap", "MCAP of ROS 2", "mcap:write"),
+    ExportFormat("kml", "KML", "kml:write", True, True, "the sea", "the track lies on the ground"),
+    ExportFormat("geojson", "GeoJSON", "geojson:write", True, False, "the ellipsoid", "coordinates are without them"),
+    ExportFormat("gpx", "GPX 1.1", "gpx:write", True, True, "the sea", "elevations are left out"),
+    ExportFormat("nmea", "NMEA 0183", "nmea:write", True, True, "the sea", "heights are left out"),
+    ExportFormat("mcap", "MCAP of ROS 2", "mcap:write", above="the ellipsoid", otherwise="fixes are without altitude"),
     ExportFormat("pos", "RTKLIB .pos", "pos:write", True, True),
     ExportFormat("csv", "CSV", "csv:write"),
 )
@@ -132,9 +134,20 @@ def _placed(trace: Trace, form: ExportFormat, options: ExportOptions) -> tuple[T
     if form.name == "mcap" and utc is None:
         notes.append(f"{trace.source}: nothing tells UTC; stamps are the recording's own")
     trace = replace(trace, utc_of_zero=utc, geoid_height=options.geoid_height_m)
-    if form.height_unknown and trace.above_sea is None:
-        notes.append(f"{trace.source}: heights {ABOVE_SEA}; {form.height_unknown}")
+    if form.above is not None and trace.geodetic:
+        notes += _heights_said(trace, form, form.above)
     return trace, notes
+
+
+def _heights_said(trace: Trace, form: ExportFormat, above: Datum) -> list[str]:
+    """Say what becomes of heights that do not count from what those of the format do."""
+    if (trace.above_sea if above == "the sea" else trace.above_ellipsoid) is not None:
+        return []
+    if trace.heights == "unknown":
+        return [f"{trace.source}: what heights count from is not known; {form.otherwise}"]
+    own = "the ellipsoid" if trace.heights == "ellipsoidal" else "the sea"
+    remedy = "--geoid-height M converts them"
+    return [f"{trace.source}: heights are above {own}, {form.title} has them above {above}; {form.otherwise}; {remedy}"]
 
 
 def utc_of(text: str, first: float) -> float:
