@@ -14,7 +14,7 @@ from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_confi
 from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
-from polyins.model.recording import FilterOptions, ImuStream, Offset, Recording
+from polyins.model.recording import FilterOptions, Heights, ImuStream, Offset, Recording
 from polyins.model.rig import Imu, Rig
 from polyins.reading import catalogue, clocks, usable
 from polyins.reading.imu_stream import as_mounted, read_imu
@@ -133,8 +133,9 @@ def assemble(
     """Read what a configuration names beside the IMUs, whose data cover `span`, and put all together."""
     notes: list[str] = []
     gnss = reference = geodetic = None
+    heights: Heights = "ellipsoidal"
     if config.gnss:
-        gnss, geodetic, texts = read_gnss(config.gnss, document, span)
+        gnss, geodetic, heights, texts = read_gnss(config.gnss, document, span)
         notes += texts
     if wheels_known:
         notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
@@ -160,6 +161,8 @@ def assemble(
         name=config.name,
         warnings=(*notes, *texts),
         aiding=aiding,
+        heights=heights,
+        utc_of_zero=clocks.utc_of_zero(config),
     )
 
 

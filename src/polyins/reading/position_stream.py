@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from polyins.formats import kf_gins, rtklib, table
 from polyins.formats.recognize import track_format
 from polyins.formats.rows import Track
 from polyins.model.geodesy import displacement
-from polyins.model.recording import Array, GnssStream, Reference
+from polyins.model.recording import Array, GnssStream, Heights, Reference
 from polyins.model.rig import DEG, check_lever_arm
 from polyins.reading.log_streams import track_of
 
@@ -76,8 +77,18 @@ def height_shift(entry: GnssEntry | ReferenceEntry, geodetic: bool, above_sea: b
     return entry.geoid_height_m
 
 
-def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStream, bool, list[str]]:
-    """Read the fixes; returns them, whether they are geodetic, and warnings. `span`: of the IMUs, s.
+class ConfiguredGnss(NamedTuple):
+    """GNSS as it is read."""
+
+    stream: GnssStream
+    geodetic: bool
+    heights: Heights
+    """what geodetic ones count from"""
+    notes: list[str]
+
+
+def read_gnss(entry: GnssEntry, document: Document, span: Span) -> ConfiguredGnss:
+    """Read the fixes. `span`: of the IMUs, s.
 
     Raises InputError for data and settings that cannot be right.
     """
@@ -89,7 +100,9 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         raise document.error(["gnss"], f"{track.source.path} has no position std; expected position_std_m")
     stream_checks.check_std(track.source, std)
     warnings += stream_checks.check_within(track.source, "GNSS", track.time, span)
+    heights: Heights = "ellipsoidal"
     if entry.height == "as-given" and track.geodetic:
+        heights = "sea-level" if track.above_sea else "unknown"
         datum = "the sea" if track.above_sea else "what those of the file are above, which is not known here"
         warnings.append(f"{track.source.path}: heights of the solution are above {datum}")
     track = _converted(track, entry, document)
@@ -98,7 +111,8 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
     if track.velocity is not None and track.velocity_std is None:
         warnings.append(f"{track.source.path}: GNSS velocity has no std and is not used")
         velocities = None, None
-    return GnssStream(track.time, track.position, std, *velocities).at(kept), track.geodetic, warnings
+    stream = GnssStream(track.time, track.position, std, *velocities).at(kept)
+    return ConfiguredGnss(stream, track.geodetic, heights, warnings)
 
 
 def _converted(track: Track, entry: GnssEntry, document: Document) -> Track:
