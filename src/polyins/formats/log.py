@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -42,6 +42,18 @@ class Log:
     antenna: tuple[float, float, float] | None = None
     """from the IMUs: forward, right, down, m; None: the log does not tell"""
     notes: tuple[str, ...] = ()
+    clock_offsets: Mapping[str, float] = field(default_factory=dict)
+    """what was added to the stamps of streams whose sensor has a clock of its own, s"""
+
+    def moved(self, shift: float) -> Log:
+        """Return the log on a clock that shows so much more, s."""
+
+        def of(streams: Mapping[str, Any]) -> dict[str, Any]:
+            return {name: replace(rows, time=rows.time + shift) for name, rows in streams.items()}
+
+        zero = None if self.utc_of_zero is None else self.utc_of_zero - shift
+        streams = of(self.imus), of(self.tracks), of(self.sensors)
+        return replace(self, imus=streams[0], tracks=streams[1], sensors=streams[2], utc_of_zero=zero)
 
     @property
     def streams(self) -> dict[str, ImuRows | Track | SensorRows]:

@@ -332,9 +332,12 @@ def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
 
 
 def _heading_lines(of: LogSource) -> list[str]:
+    assert isinstance(of.rows, SensorRows)
+    told = of.rows.std is not None
+    how = "or leave it out, to take what the log tells" if told else "the log does not tell how good this heading is"
     return [
         *_place_lines(of),
-        f"  std_deg: {HEADING_STD_DEG:g}  {CHECK} the log does not tell how good this heading is",
+        f"  std_deg: {HEADING_STD_DEG:g}  {CHECK} {how}",
         f"  offset_std_deg: {HEADING_STD_DEG:g}  {CHECK} of a constant part of its error",
         f"  rate_hz: {HEADING_RATE_HZ:g}  # its errors last",
     ]
