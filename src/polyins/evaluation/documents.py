@@ -137,6 +137,8 @@ class RunDocument(MethodDocument):
     first_call_s: float
     measurements: dict[str, MeasurementCounts]
     offsets: dict[str, OffsetFigures]
+    heights: str
+    """what those of the solution count from: ellipsoid, sea, unknown, or local: the zero of a plane"""
     start: dict[str, object]
     verdict: VerdictDocument
     coverage: CoverageFigures

@@ -75,6 +75,7 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
             for name, one in solution.offsets.items()
             if one.value.size
         },
+        "heights": solution.datum if solution.geodetic else "local",
         "start": solution.start,
         "verdict": judged.document(),
         "coverage": coverage(solution.recording_span, figures.epochs),

@@ -2,7 +2,8 @@
 
 `TimeUS` counts microseconds since boot, axes are forward, right, down; rates and forces are instants of the filtered
 sensors. IMU instances are messages IMU, IMU2, IMU3 up to 4.0, afterwards messages IMU with a number `I`; those of
-batches (ISBH, ISBD) are left aside. `Alt` of GPS is above the sea. Fixes are stamped as they arrive.
+batches (ISBH, ISBD) are left aside. `Alt` of GPS is above the sea; `Und` of GPA, in new logs, is the height of that less
+the height above the ellipsoid. Fixes are stamped as they arrive.
 """
 
 from __future__ import annotations
@@ -99,11 +100,14 @@ def _track(path: Path, name: str, fixes: Table, accuracies: Table | None) -> Tra
     std, velocity_std = _accuracies(fixes["TimeUS"], accuracies)
     if std is not None:
         kept = kept[(std[kept] > 0.0).all(axis=1)]
+    lowered = _at_fixes(fixes["TimeUS"], accuracies, "Und")[kept]
+    known = bool(len(kept)) and bool(np.isfinite(lowered).all())
+    height = fixes["Alt"][kept] - (lowered if known else 0.0)
     return Track(
         RowSource(f"{path}, {name}"),
         time[kept],
-        np.column_stack([fixes["Lat"] * DEG, fixes["Lng"] * DEG, fixes["Alt"]])[kept],
-        above_sea=True,
+        np.column_stack([fixes["Lat"][kept] * DEG, fixes["Lng"][kept] * DEG, height]),
+        above_sea=not known,
         position_std=None if std is None else std[kept],
         velocity=None if velocity_std is None else velocity[kept],
         velocity_std=None if velocity_std is None else velocity_std[kept],
@@ -115,11 +119,18 @@ def _accuracies(stamps: Array, table: Table | None) -> tuple[Array | None, Array
     """Return the std of position and velocity at each fix, shape (M, 3), of the same stamp or the last before."""
     if table is None or "HAcc" not in table:
         return None, None
+    horizontal, vertical, speed = (_at_fixes(stamps, table, key) for key in ("HAcc", "VAcc", "SAcc"))
+    position = np.nan_to_num(np.column_stack([horizontal, horizontal, vertical]))
+    velocity = np.repeat(np.nan_to_num(speed)[:, None], 3, axis=1)
+    return position, velocity if (speed[np.isfinite(speed)] > 0.0).all() else None
+
+
+def _at_fixes(stamps: Array, table: Table | None, key: str) -> Array:
+    """Return what was logged with each fix, shape (M,), or NaN: of the same stamp or the last before."""
+    if table is None or key not in table:
+        return np.full(len(stamps), np.nan)
     last = np.searchsorted(table["TimeUS"], stamps, "right") - 1
-    horizontal, vertical, speed = (np.where(last >= 0, table[key][last], 0.0) for key in ("HAcc", "VAcc", "SAcc"))
-    position = np.column_stack([horizontal, horizontal, vertical])
-    velocity = np.repeat(speed[:, None], 3, axis=1)
-    return position, velocity if (speed[last >= 0] > 0.0).all() else None
+    return np.where(last >= 0, table[key][last], np.nan)
 
 
 def _headings(path: Path, tables: dict[str, Table]) -> dict[str, SensorRows]:

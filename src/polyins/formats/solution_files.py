@@ -146,6 +146,7 @@ def read_solution(path: Path) -> Solution:
         filter_s=metadata.get("filter_s", 0.0),
         first_call_s=metadata.get("first_call_s", 0.0),
         status=_statuses(columns),
+        datum=metadata.get("datum", "ellipsoid"),
         recording_span=None if metadata.get("recording_span") is None else tuple(metadata["recording_span"]),
         findings=findings,
     )
@@ -213,6 +214,7 @@ def _metadata(solution: Solution, origin: Array) -> dict[str, object]:
         "start": solution.start,
         "filter_s": solution.filter_s,
         "first_call_s": solution.first_call_s,
+        "datum": solution.datum,
         "recording_span": solution.recording_span,
         "findings": [finding.document() for finding in solution.findings],
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from polyins.model.findings import Finding
 from polyins.model.rig import DEG, Rig, Vector, zero_vector
 
 Array = NDArray[np.float64]
+Datum = Literal["ellipsoid", "sea", "unknown"]
+"""what heights of geodetic positions count from"""
 Rows = slice | NDArray[np.bool_] | NDArray[np.intp]
 """which rows of a stream"""
 
@@ -65,6 +68,7 @@ class GnssStream:
     """m/s north, east, down, shape (M, 3)"""
     velocity_std: Array | None = None
     """m/s, shape (M, 3)"""
+    datum: Datum = "ellipsoid"
 
     def at(self, rows: Rows) -> GnssStream:
         """Return some of the fixes."""
@@ -73,7 +77,7 @@ class GnssStream:
             return None if values is None else values[rows]
 
         stds = self.position_std[rows], of(self.velocity), of(self.velocity_std)
-        return GnssStream(self.time[rows], self.position[rows], *stds)
+        return GnssStream(self.time[rows], self.position[rows], *stds, datum=self.datum)
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,7 @@ class Reference:
     """roll, pitch, heading, rad, shape (R, 3)"""
     lever_arm: Vector = field(default_factory=zero_vector)
     """The reference's point in the array frame, m."""
+    datum: Datum = "ellipsoid"
 
     def between(self, first: int, last: int) -> Reference:
         """Return rows first ... last - 1."""
@@ -253,6 +258,12 @@ class Recording:
     """what was found where the configuration says `time_offset: estimate`"""
     aiding: tuple[AidingStream, ...] = ()
     """what sensors beside IMUs and GNSS say"""
+
+    @property
+    def datum(self) -> Datum:
+        """What heights count from, of positions that are geodetic."""
+        known = self.gnss or self.reference
+        return known.datum if known else "ellipsoid"
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.model.findings import SILENT, Finding
+from polyins.model.recording import Datum
 from polyins.model.rig import Vector
 
 Array = NDArray[np.float64]
@@ -166,6 +167,8 @@ class Solution:
     """time spent on compiling or loading the kernels"""
     status: NDArray[np.uint8] | None = None
     """what each state is worth, an index into `model.status.STATUSES`, shape (T,); None: it is not known"""
+    datum: Datum = "ellipsoid"
+    """what heights count from, of positions that are geodetic"""
     recording_span: tuple[float, float] | None = None
     """s, s: what the IMUs of the recording cover"""
     findings: tuple[Finding, ...] = ()

@@ -14,7 +14,7 @@ from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_confi
 from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
-from polyins.model.recording import FilterOptions, ImuStream, Offset, Recording
+from polyins.model.recording import FilterOptions, GnssStream, ImuStream, Offset, Recording, Reference
 from polyins.model.rig import Imu, Rig
 from polyins.reading import catalogue, clocks, usable
 from polyins.reading.imu_stream import as_mounted, read_imu
@@ -139,9 +139,9 @@ def assemble(
     if wheels_known:
         notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
     if config.reference:
-        _one_datum(config, document)
         reference, kind, texts = read_reference(config.reference, document, span)
         geodetic = _one_kind(geodetic, kind, document.place(["reference"]))
+        _one_datum(gnss, reference, document)
         notes += texts
     if config.start.position:
         geodetic = _one_kind(geodetic, config.start.position.geodetic, document.place(["start", "position"]))
@@ -251,13 +251,9 @@ def _one_kind(known: bool | None, new: bool, place: str) -> bool:
     return new
 
 
-def _one_datum(config: Config, document: Document) -> None:
+def _one_datum(gnss: GnssStream | None, reference: Reference, document: Document) -> None:
     """Refuse heights of which only one are left as they are: nothing says that they count from the same."""
-    if (
-        config.gnss
-        and config.reference
-        and (config.gnss.height == "as-given") != (config.reference.height == "as-given")
-    ):
+    if gnss is not None and (gnss.datum == "ellipsoid") != (reference.datum == "ellipsoid"):
         raise document.error(
             ["reference", "height"], "is as-given for one of gnss and reference; expected it for both, or neither"
         )

@@ -14,6 +14,7 @@ from polyins.config import NOISE_GRADES
 from polyins.config.yaml_document import Document, as_document
 from polyins.errors import InputError
 from polyins.files import find
+from polyins.formats import geoid
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
@@ -315,8 +316,17 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list
     if section == "gnss" and track.position_std is None:
         lines.append(f"  position_std_m: [1.5, 1.5, 3.0]  {CHECK} north, east, down; the file has none")
     if track.above_sea:
-        lines.append(f"  height: as-given  {CHECK} above the sea; sea-level with geoid_height_m makes them ellipsoidal")
+        lines.append(_height_line())
     return lines
+
+
+def _height_line() -> str:
+    if geoid.library() is not None:
+        return f"  height: sea-level  {CHECK} above the sea; {geoid.MODEL} or geoid_height_m makes them ellipsoidal"
+    return (
+        f"  height: as-given  {CHECK} above the sea; sea-level with geoid_height_m, or a grid of it (pip install "
+        "'polyins[geoid]'), makes them ellipsoidal"
+    )
 
 
 def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
