@@ -2,8 +2,8 @@
 
 `TimeUS` counts microseconds since boot, axes are forward, right, down; rates and forces are instants of the filtered
 sensors. IMU instances are messages IMU, IMU2, IMU3 up to 4.0, afterwards messages IMU with a number `I`; those of
-batches (ISBH, ISBD) are left aside. `Alt` of GPS is above the sea; `Und` of GPA, in new logs, is the height of that less
-the height above the ellipsoid. Fixes are stamped as they arrive.
+batches (ISBH, ISBD) are left aside. `Alt` of GPS is above the sea; `Und` of GPA, in new logs, is the height of
+that less the height above the ellipsoid. Fixes are stamped as they arrive.
 """
 
 from __future__ import annotations
