@@ -89,6 +89,19 @@ def rates_to_rows(path: Path, name: str, time: Array, gyro: Array, force: Array)
     return ImuRows(source, time, gyro * steps, force * steps, gyro_unit="rad/s", accel_unit="m/s^2")
 
 
+def joined_rates(path: Path, name: str, gyro: Array, force: Array) -> ImuRows:
+    """Return rows at the gyro's stamps, where the accelerometer has one within an interval.
+
+    `gyro`: s, and rad/s, shape (T, 4); `force`: s, and m/s^2, shape (K, 4); stamps rise.
+    """
+    interval = float(np.median(np.diff(gyro[:, 0]))) if len(gyro) > 1 else 0.0
+    later = np.clip(np.searchsorted(force[:, 0], gyro[:, 0]), 1, len(force) - 1)
+    away = np.minimum(np.abs(force[later, 0] - gyro[:, 0]), np.abs(force[later - 1, 0] - gyro[:, 0]))
+    kept = gyro[away <= interval]
+    forces = np.column_stack([np.interp(kept[:, 0], force[:, 0], axis) for axis in force[:, 1:].T])
+    return rates_to_rows(path, name, kept[:, 0], kept[:, 1:], forces)
+
+
 def counted(kinds: Iterable[Any], name_of: Callable[[Any], str]) -> dict[str, int]:
     """Return how many fixes there are of each kind, by name."""
     values, counts = np.unique(np.asarray(list(kinds)), return_counts=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.formats.log import rates_to_rows, rising
+from polyins.formats.log import joined_rates, rising
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -67,7 +67,7 @@ def read(path: Path, sensed: Sequence[Sensed], track: Track | None) -> Sensors:
         found.notes.append(f"{name}: {said}")
         if len(gyro) > 1 and len(force) > 1:
             shift = np.array([offset, 0.0, 0.0, 0.0])
-            found.imus[name] = _joined(path, name, gyro + shift, force + shift)
+            found.imus[name] = joined_rates(path, name, gyro + shift, force + shift)
         elif len(gyro) or len(force):
             found.notes.append(f"{name} holds {len(gyro)} rows of gyros and {len(force)} of accelerometers")
         shifted = {kind: np.array(rows) + np.array([offset, 0.0]) for kind, rows in values.items()}
@@ -130,16 +130,6 @@ def _three(values: Mapping[int, Sequence[tuple[float, int]]], kinds: tuple[int, 
 
 def _signed(bits: int) -> int:
     return bits - (1 << 24) if bits & COUNTER else bits
-
-
-def _joined(path: Path, name: str, gyro: Array, force: Array) -> ImuRows:
-    """Return the rows at the gyro's stamps, where the accelerometer has one within an interval."""
-    interval = float(np.median(np.diff(gyro[:, 0])))
-    later = np.clip(np.searchsorted(force[:, 0], gyro[:, 0]), 1, len(force) - 1)
-    away = np.minimum(np.abs(force[later, 0] - gyro[:, 0]), np.abs(force[later - 1, 0] - gyro[:, 0]))
-    kept = gyro[away <= interval]
-    forces = np.column_stack([np.interp(kept[:, 0], force[:, 0], axis) for axis in force[:, 1:].T])
-    return rates_to_rows(path, name, kept[:, 0], kept[:, 1:], forces)
 
 
 def _offset(sensed: Sequence[Sensed], stamps: Sequence[tuple[int, float]], gyro: Array) -> tuple[float, str]:

@@ -41,6 +41,8 @@ LEAST_SIGMAS = 4.0
 """of what chance makes, by which a horizontal axis agrees with the acceleration of the speed if it is forward"""
 FEWEST_MEANS = 20
 """of a second, to tell which axis points forward"""
+BAROMETER_STD_M, BAROMETER_BIAS_M, WEATHER_M_SQRT_S = 1.0, 300.0, 0.1
+"""noise of a barometer on a vehicle; 35 hPa; 6 m in an hour"""
 HEADING_RATE_HZ = 1.0
 """errors of another filter last; taken at its own rate they would be averaged away"""
 
@@ -95,6 +97,8 @@ def propose(paths: Sequence[str | Path]) -> str:
         lines += ["", "heading:", *_heading_lines(heading)]
     for speed in speeds[:1]:
         lines += ["", "odometer:", *_odometer_lines(speed)]
+    for height in _sensors(read, "height")[:1] if "gnss" in sections[: len(tracks)] else []:
+        lines += ["", "height:", *_barometer_lines(height)]
     lines += ["", "start:", _start_line(bool(tracks) and not only_solution, tracks, headings)]
     return "\n".join(lines) + "\n"
 
@@ -280,6 +284,18 @@ def _odometer_lines(of: LogSource) -> list[str]:
         f"  std_m_s: 0.1  {CHECK} slip is what makes a wheel's speed wrong, not what the log states",
         f"  scale_std: 0.05  {CHECK} of a constant part of its error",
         f"  position_m: [0, 0, 0]  {CHECK} between the wheels: forward, right, down from the array's origin, m",
+    ]
+
+
+def _barometer_lines(of: LogSource) -> list[str]:
+    assert isinstance(of.rows, SensorRows)
+    std = f"  std_m: {BAROMETER_STD_M:g}  {CHECK} wind and rotors press on it as well"
+    return [
+        *_place_lines(of),
+        std,
+        f"  bias_std_m: {BAROMETER_BIAS_M:g}  {CHECK} by which the weather is off the standard atmosphere, and the sea",
+        f"  bias_random_walk_m_sqrt_s: {WEATHER_M_SQRT_S:g}  {CHECK} how fast the weather changes",
+        f"  position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
     ]
 
 
