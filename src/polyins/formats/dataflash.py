@@ -22,7 +22,9 @@ from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
 IMU_MESSAGES = ("IMU", "IMU2", "IMU3")
-KINDS = (*IMU_MESSAGES, "GPS", "GPS2", "GPA", "GPA2", "ATT", "PARM")
+FILTERS = ("NKF1", "NKF6", "XKF1", "XKF6")
+"""messages of the autopilot's own filters: EKF2 and EKF3, first and second core, or with a number `C`"""
+KINDS = (*IMU_MESSAGES, "GPS", "GPS2", "GPA", "GPA2", "ATT", "PARM", *FILTERS)
 THREE_DIMENSIONS = 3
 FIXES = {0: "none", 1: "none", 2: "2D", 3: "3D", 4: "DGPS", 5: "float", 6: "fix"}
 
@@ -36,13 +38,14 @@ def read(path: str | Path) -> Log:
     with damage_named(found, "ArduPilot DataFlash"):
         tables, parameters = _tables(library.DFReader_binary(str(found)))
         imus = _imus(found, tables)
-        tracks = _tracks(found, tables)
+        tracks, estimates = _tracks(found, tables), _estimates(found, tables)
         return Log(
             "boot",
             imus,
-            tracks,
+            tracks | estimates,
             _headings(found, tables),
-            dict.fromkeys(list(tracks)[1:], "only one receiver can aid the filter"),
+            dict.fromkeys(list(tracks)[1:], "only one receiver can aid the filter")
+            | dict.fromkeys(estimates, "ArduPilot's own estimate, on a plane"),
             utc_of_zero=_utc_of_zero(tables),
             upright=True,
             fix_age=parameters["GPS_DELAY_MS"] * 1e-3 if parameters.get("GPS_DELAY_MS") else None,
@@ -59,7 +62,7 @@ def _tables(reader: Any) -> tuple[dict[str, Table], dict[str, float]]:
         if kind == "PARM":
             parameters[values["Name"]] = float(values["Value"])
         elif "TimeUS" in values:
-            rows[_name(kind, values.get("I"))].append(values)
+            rows[_name(kind, values.get("C" if kind in FILTERS else "I"))].append(values)
     tables = {}
     for name, found in rows.items():
         numeric = [key for key, value in found[0].items() if isinstance(value, int | float)]
@@ -131,6 +134,25 @@ def _at_fixes(stamps: Array, table: Table | None, key: str) -> Array:
         return np.full(len(stamps), np.nan)
     last = np.searchsorted(table["TimeUS"], stamps, "right") - 1
     return np.where(last >= 0, table[key][last], np.nan)
+
+
+def _estimates(path: Path, tables: dict[str, Table]) -> dict[str, Track]:
+    """Return what the autopilot's own filters say: north, east and height on their plane, m, with the attitude."""
+    found = {}
+    for name in sorted(tables):
+        table = tables[name]
+        if not name.startswith(FILTERS) or not {"PN", "PE", "PD", "Roll", "Pitch", "Yaw"} <= set(table):
+            continue
+        time = table["TimeUS"] * 1e-6
+        kept = rising(time)
+        place, speed, angles = (
+            np.column_stack([table[one] for one in names])[kept]
+            for names in (("PN", "PE", "PD"), ("VN", "VE", "VD"), ("Roll", "Pitch", "Yaw"))
+        )
+        attitude = (angles * DEG + np.pi) % (2.0 * np.pi) - np.pi
+        position, source = place * [1.0, 1.0, -1.0], RowSource(f"{path}, {name}")
+        found[name] = Track(source, time[kept], position, geodetic=False, velocity=speed, attitude=attitude)
+    return found
 
 
 def _headings(path: Path, tables: dict[str, Table]) -> dict[str, SensorRows]:
