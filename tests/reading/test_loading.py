@@ -157,7 +157,7 @@ def test_sea_level_heights_are_raised_by_a_grid_if_there_is_one(
     monkeypatch.setattr(geoid, "heights", lambda position: 40.0 + 0.1 * np.arange(len(position)))
     recording = loaded(tmp_path, gnss={"height": "sea-level"})
     np.testing.assert_allclose(recording.gnss.position[:, 2], 60.0 + 0.1 * np.arange(10))
-    assert recording.datum == "ellipsoid"
+    assert recording.heights == "ellipsoidal"
     assert any("brought above the ellipsoid by EGM96, 40.5 m there" in text for text in recording.warnings)
     own = loaded(tmp_path, gnss={"height": "sea-level", "geoid_height_m": -13.5})
     np.testing.assert_allclose(own.gnss.position[:, 2], 6.5)
@@ -166,7 +166,7 @@ def test_sea_level_heights_are_raised_by_a_grid_if_there_is_one(
 
 def test_heights_that_stay_as_they_are_are_not_compared_with_others(tmp_path: Path) -> None:
     recording = loaded(tmp_path, gnss={"height": "as-given"})
-    assert recording.datum == "unknown"
+    assert recording.heights == "unknown"
     assert any("above what those of the file are above" in text for text in recording.warnings)
     values = write_recording(tmp_path)
     values["reference"] = {"file": "gnss.txt"}
@@ -174,7 +174,7 @@ def test_heights_that_stay_as_they_are_are_not_compared_with_others(tmp_path: Pa
     with pytest.raises(InputError, match="as-given for one of gnss and reference"):
         load(write_config(tmp_path, values))
     values["reference"]["height"] = "as-given"
-    assert load(write_config(tmp_path, values)).datum == "unknown"
+    assert load(write_config(tmp_path, values)).heights == "unknown"
 
 
 def test_a_given_std_takes_the_place_of_the_file(tmp_path: Path) -> None:

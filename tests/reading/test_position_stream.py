@@ -49,6 +49,6 @@ def test_what_is_no_reference(tmp_path: Path) -> None:
 
 def test_heights_above_another_zero_do_not_judge(tmp_path: Path) -> None:
     gnss = write_rows(tmp_path / "gnss.txt", fixes())
-    with pytest.raises(InputError, match="above the ellipsoid, those of the solution above the sea"):
-        load_reference(gnss, replace(solution(), datum="sea"))
-    assert load_reference(gnss, replace(solution(), datum="unknown")).datum == "ellipsoid"
+    with pytest.raises(InputError, match="ellipsoidal, those of the solution sea-level; expected both alike"):
+        load_reference(gnss, replace(solution(), heights="sea-level"))
+    assert load_reference(gnss, replace(solution(), heights="unknown")).heights == "ellipsoidal"

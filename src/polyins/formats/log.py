@@ -61,13 +61,13 @@ class Log:
         return {**self.imus, **self.tracks, **self.sensors}
 
 
-def needed(module: str, extra: str, path: Path) -> Any:
-    """Import the library that a format is read with; raise InputError that says what to install without it."""
+def needed(module: str, extra: str, path: str | Path, use: str = "read") -> Any:
+    """Import the library that a format needs; raise InputError that says what to install without it."""
     try:
         return import_module(module)
     except ImportError:
         library = module.partition(".")[0]
-        raise InputError(f"{path}: is read with {library}; expected pip install 'polyins[{extra}]'") from None
+        raise InputError(f"{path}: is {use} with {library}; expected pip install 'polyins[{extra}]'") from None
 
 
 @contextmanager

@@ -17,10 +17,9 @@ import numpy as np
 
 from polyins.files import find, read_bytes
 from polyins.formats import nmea_log, ublox_sensors
-from polyins.formats.gps_time import utc_of_week
+from polyins.formats.gps_time import GPS_EPOCH, WEEK_S, utc_of_week
 from polyins.formats.log import Log, counted, damage_named, needed, rising
 from polyins.formats.rows import RowSource, SensorRows, Track
-from polyins.formats.rtklib import GPS_EPOCH, WEEK_S
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 

@@ -17,10 +17,9 @@ from polyins.model.findings import Finding
 from polyins.model.rig import DEG, Rig, Vector, zero_vector
 
 Array = NDArray[np.float64]
-Datum = Literal["ellipsoid", "sea", "unknown"]
-"""what heights of geodetic positions count from"""
 Rows = slice | NDArray[np.bool_] | NDArray[np.intp]
 """which rows of a stream"""
+Heights = Literal["ellipsoidal", "sea-level", "unknown"]
 
 
 USUAL_OF = 10_000
@@ -68,7 +67,6 @@ class GnssStream:
     """m/s north, east, down, shape (M, 3)"""
     velocity_std: Array | None = None
     """m/s, shape (M, 3)"""
-    datum: Datum = "ellipsoid"
 
     def at(self, rows: Rows) -> GnssStream:
         """Return some of the fixes."""
@@ -77,7 +75,7 @@ class GnssStream:
             return None if values is None else values[rows]
 
         stds = self.position_std[rows], of(self.velocity), of(self.velocity_std)
-        return GnssStream(self.time[rows], self.position[rows], *stds, datum=self.datum)
+        return GnssStream(self.time[rows], self.position[rows], *stds)
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,8 @@ class Reference:
     """roll, pitch, heading, rad, shape (R, 3)"""
     lever_arm: Vector = field(default_factory=zero_vector)
     """The reference's point in the array frame, m."""
-    datum: Datum = "ellipsoid"
+    heights: Heights = "ellipsoidal"
+    """what those of geodetic positions count from"""
 
     def between(self, first: int, last: int) -> Reference:
         """Return rows first ... last - 1."""
@@ -258,12 +257,10 @@ class Recording:
     """what was found where the configuration says `time_offset: estimate`"""
     aiding: tuple[AidingStream, ...] = ()
     """what sensors beside IMUs and GNSS say"""
-
-    @property
-    def datum(self) -> Datum:
-        """What heights count from, of positions that are geodetic."""
-        known = self.gnss or self.reference
-        return known.datum if known else "ellipsoid"
+    heights: Heights = "ellipsoidal"
+    """what the heights of geodetic positions count from"""
+    utc_of_zero: float | None = None
+    """Unix time at which the common clock shows zero, s; None: no file tells it"""
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.model.findings import SILENT, Finding
-from polyins.model.recording import Datum
+from polyins.model.recording import Heights
 from polyins.model.rig import Vector
 
 Array = NDArray[np.float64]
@@ -167,12 +167,14 @@ class Solution:
     """time spent on compiling or loading the kernels"""
     status: NDArray[np.uint8] | None = None
     """what each state is worth, an index into `model.status.STATUSES`, shape (T,); None: it is not known"""
-    datum: Datum = "ellipsoid"
-    """what heights count from, of positions that are geodetic"""
     recording_span: tuple[float, float] | None = None
     """s, s: what the IMUs of the recording cover"""
     findings: tuple[Finding, ...] = ()
     """what there is to say of data and run"""
+    heights: Heights = "ellipsoidal"
+    """what the heights of geodetic positions count from"""
+    utc_of_zero: float | None = None
+    """Unix time at which `time` is zero, s; None: it is not known"""
 
     @property
     def warnings(self) -> tuple[str, ...]:

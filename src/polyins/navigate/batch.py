@@ -396,9 +396,10 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         start={"time_s": run.start.time, **run.start.sources},
         filter_s=filter_s,
         first_call_s=first_call_s,
-        datum=recording.datum,
         status=status_of(track, aided, recording.options.gnss_snap),
         recording_span=_span(recording),
+        heights=recording.heights,
+        utc_of_zero=recording.utc_of_zero,
         findings=(
             *notes(recording.warnings),
             *recording.findings,

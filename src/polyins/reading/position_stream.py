@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from polyins.formats import geoid, kf_gins, rtklib, table
 from polyins.formats.recognize import track_format
 from polyins.formats.rows import Track
 from polyins.model.geodesy import displacement
-from polyins.model.recording import Array, Datum, GnssStream, Reference
+from polyins.model.recording import Array, GnssStream, Heights, Reference
 from polyins.model.rig import DEG, check_lever_arm
 from polyins.reading.log_streams import track_of
 
@@ -87,15 +88,25 @@ def height_shift(
     return geoid.heights(position) if entry.geoid_height_m is None else entry.geoid_height_m
 
 
-def _datum(track: Track, entry: GnssEntry | ReferenceEntry) -> Datum:
+def _heights(track: Track, entry: GnssEntry | ReferenceEntry) -> Heights:
     """Return what the heights of a track that is read count from."""
     if not track.geodetic or entry.height != "as-given":
-        return "ellipsoid"
-    return "sea" if track.above_sea else "unknown"
+        return "ellipsoidal"
+    return "sea-level" if track.above_sea else "unknown"
 
 
-def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStream, bool, list[str]]:
-    """Read the fixes; returns them, whether they are geodetic, and warnings. `span`: of the IMUs, s.
+class ConfiguredGnss(NamedTuple):
+    """GNSS as it is read."""
+
+    stream: GnssStream
+    geodetic: bool
+    heights: Heights
+    """what geodetic ones count from"""
+    notes: list[str]
+
+
+def read_gnss(entry: GnssEntry, document: Document, span: Span) -> ConfiguredGnss:
+    """Read the fixes. `span`: of the IMUs, s.
 
     Raises InputError for data and settings that cannot be right.
     """
@@ -107,7 +118,8 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         raise document.error(["gnss"], f"{track.source.path} has no position std; expected position_std_m")
     stream_checks.check_std(track.source, std)
     warnings += stream_checks.check_within(track.source, "GNSS", track.time, span)
-    if entry.height == "as-given" and track.geodetic:
+    heights = _heights(track, entry)
+    if heights != "ellipsoidal":
         datum = "the sea" if track.above_sea else "what those of the file are above, which is not known here"
         warnings.append(f"{track.source.path}: heights of the solution are above {datum}")
     track = _converted(track, entry, document)
@@ -117,8 +129,8 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         if velocity is not None:
             warnings.append(f"{track.source.path}: GNSS velocity has no std and is not used")
         velocity = velocity_std = None
-    stream = GnssStream(track.time, track.position, std, velocity, velocity_std, _datum(track, entry))
-    return stream.at(kept), track.geodetic, warnings
+    stream = GnssStream(track.time, track.position, std, velocity, velocity_std).at(kept)
+    return ConfiguredGnss(stream, track.geodetic, heights, warnings)
 
 
 def _converted(track: Track, entry: GnssEntry, document: Document) -> Track:
@@ -159,8 +171,8 @@ def read_reference(entry: ReferenceEntry, document: Document, span: Span) -> tup
     warnings += stream_checks.check_within(track.source, "reference", track.time, span)
     with document.at(["reference", "point_m"]):
         check_lever_arm("point", np.array(entry.point_m))
-    point, datum = np.array(entry.point_m), _datum(track, entry)
-    reference = Reference(track.time, track.position, track.velocity, track.attitude, point, datum)
+    point, heights = np.array(entry.point_m), _heights(track, entry)
+    reference = Reference(track.time, track.position, track.velocity, track.attitude, point, heights)
     return reference, track.geodetic, warnings
 
 

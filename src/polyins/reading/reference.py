@@ -8,7 +8,7 @@ from polyins.checks import stream_checks
 from polyins.errors import InputError
 from polyins.formats.recognize import data_format
 from polyins.formats.rows import Track
-from polyins.model.recording import Datum, Reference
+from polyins.model.recording import Heights, Reference
 from polyins.model.solution import Solution
 from polyins.reading.guess import read_stream
 from polyins.reading.loading import load
@@ -31,13 +31,14 @@ def load_reference(path: str | Path, solution: Solution) -> Reference:
             raise InputError(f"{path}: holds IMU data; expected positions")
         stream_checks.check_track(track, "reference")
         stream_checks.check_within(track.source, "reference", track.time, (solution.time[0], solution.time[-1]))
-        above: Datum = "sea" if track.above_sea else solution.datum if data_format(path) == "table" else "ellipsoid"
+        above: Heights = "sea-level" if track.above_sea else "ellipsoidal"
+        if data_format(path) == "table":
+            above = solution.heights
         reference = Reference(track.time, track.position, track.velocity, track.attitude, solution.point, above)
         geodetic = track.geodetic
-    if geodetic and {reference.datum, solution.datum} == {"sea", "ellipsoid"}:
+    if geodetic and {reference.heights, solution.heights} == {"sea-level", "ellipsoidal"}:
         raise InputError(
-            f"{path}: heights are above the {reference.datum}, those of the solution above the {solution.datum}; "
-            "expected both above the same"
+            f"{path}: heights are {reference.heights}, those of the solution {solution.heights}; expected both alike"
         )
     if geodetic != solution.geodetic:
         kinds = {True: "latitude and longitude", False: "metres on a local plane"}
