@@ -35,6 +35,8 @@ VELOCITY_STD_NAMES = ("std_north_velocity_m_s", "std_east_velocity_m_s", "std_do
 ATTITUDE_NAMES = ("roll_deg", "pitch_deg", "heading_deg")
 SENSOR_NAMES = {"height": "height_m", "heading": "heading_deg", "odometer": "speed_m_s"}
 """what sensors beside IMUs and GNSS show, by kind"""
+SHOWN_NAMES = {**SENSOR_NAMES, "speed": "speed_m_s", "ticks": "ticks"}
+"""and what else logs hold"""
 METADATA = b"polyins"
 """of a Parquet file, a JSON document"""
 
@@ -186,8 +188,8 @@ def write_imu(path: str | Path, stream: ImuStream, utc_of_zero: float | None = N
 
 
 def write_sensor(path: str | Path, rows: SensorRows, utc_of_zero: float | None = None) -> None:
-    """Write what a sensor of height, heading or speed shows, and its std where there is one, as CSV or Parquet."""
-    name, unit = SENSOR_NAMES[rows.kind], DEG if rows.kind == "heading" else 1.0
+    """Write what a sensor shows, and its std where there is one, as CSV or Parquet."""
+    name, unit = SHOWN_NAMES[rows.kind], DEG if rows.kind == "heading" else 1.0
     given = {name: rows.value, f"std_{name}": rows.std}
     known = {column: values / unit for column, values in given.items() if values is not None}
     _write(path, ("time_s", *known), [rows.time, *known.values()], utc_of_zero)

@@ -107,6 +107,8 @@ class Reference:
     """roll, pitch, heading, rad, shape (R, 3)"""
     lever_arm: Vector = field(default_factory=zero_vector)
     """The reference's point in the array frame, m."""
+    heights: Heights = "ellipsoidal"
+    """what those of geodetic positions count from"""
 
     def between(self, first: int, last: int) -> Reference:
         """Return rows first ... last - 1."""

@@ -140,9 +140,14 @@ def assemble(
     if wheels_known:
         notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
     if config.reference:
-        _one_datum(config, document)
         reference, kind, texts = read_reference(config.reference, document, span)
         geodetic = _one_kind(geodetic, kind, document.place(["reference"]))
+        if gnss is None:
+            heights = reference.heights
+        elif (heights == "ellipsoidal") != (reference.heights == "ellipsoidal"):
+            raise document.error(
+                ["reference", "height"], "is as-given for one of gnss and reference; expected it for both, or neither"
+            )
         notes += texts
     if config.start.position:
         geodetic = _one_kind(geodetic, config.start.position.geodetic, document.place(["start", "position"]))
@@ -252,18 +257,6 @@ def _one_kind(known: bool | None, new: bool, place: str) -> bool:
         kinds = {True: "latitude and longitude", False: "on a local plane"}
         raise InputError(f"{place}: positions are {kinds[new]}, those before {kinds[known]}; expected one kind")
     return new
-
-
-def _one_datum(config: Config, document: Document) -> None:
-    """Refuse heights of which only one are left as they are: nothing says that they count from the same."""
-    if (
-        config.gnss
-        and config.reference
-        and (config.gnss.height == "as-given") != (config.reference.height == "as-given")
-    ):
-        raise document.error(
-            ["reference", "height"], "is as-given for one of gnss and reference; expected it for both, or neither"
-        )
 
 
 def _with_absolute_paths(config: Config, folder: Path, path: Path) -> Config:
