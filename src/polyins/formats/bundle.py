@@ -5,7 +5,7 @@ from __future__ import annotations
 import gzip
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -48,14 +48,27 @@ class Bundle:
                 found.setdefault(match[1] if match.lastindex else name, name)
         return found
 
+    def inside(self, folder: str) -> list[str]:
+        """Return the names of all files directly in a folder, in order."""
+        if self.path.is_dir():
+            return [f"{folder}/{entry.name}" for entry in sorted((self.path / folder).iterdir()) if entry.is_file()]
+        return sorted(name for name in self.names if name.rpartition("/")[0] == folder)
+
     def read(self, name: str) -> bytes:
         """Return the content of a file; raises InputError if it is damaged or empty."""
+        return self.read_all([name])[0]
+
+    def read_all(self, names: Sequence[str]) -> list[bytes]:
+        """Return the contents of files; raises InputError as `read` does."""
         if self.path.is_dir():
-            return read_bytes(self.path / name)
+            return [read_bytes(self.path / name) for name in names]
+        with _archive(self.path) as archive:
+            return [self._unpacked(archive, name) for name in names]
+
+    def _unpacked(self, archive: ZipFile, name: str) -> bytes:
         try:
-            with _archive(self.path) as archive:
-                content = archive.read(name)
-        except (BadZipFile, OSError, EOFError, zlib.error) as error:
+            content = archive.read(name)
+        except (BadZipFile, OSError, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
             raise InputError(f"{self.path}, {name}: cannot be unpacked ({error}); is it damaged?") from error
         if not content.strip():
             raise InputError(f"{self.path}, {name}: is empty; expected data")

@@ -13,7 +13,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_head
-from polyins.formats import bundle, euroc, kf_gins, mimu4444, vectornav, xsens_mt
+from polyins.formats import bundle, euroc, kf_gins, kitti, mimu4444, phone, vectornav, xsens_mt
 from polyins.formats.columns import PARQUET_MAGIC
 from polyins.formats.log import Log
 from polyins.formats.rtklib import has_rows
@@ -82,10 +82,12 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("nmea", "NMEA 0183", _has_nmea, "nmea_log", "", ""),
     LogFormat("xsens-mt", "Xsens MT Manager text", xsens_mt.fits, "xsens_mt", "", ""),
     LogFormat("vectornav", "VectorNav CSV", vectornav.fits, "vectornav", "", ""),
+    LogFormat("kitti-oxts", "KITTI raw drive (oxts)", kitti.fits, "kitti", "", ""),
+    LogFormat("phone", "phyphox or Sensor Logger export", phone.fits, "phone", "", ""),
     LogFormat("euroc", "EuRoC (ASL) folder", euroc.fits, "euroc", "", ""),
     LogFormat("mimu4444", "MIMU4444", mimu4444.fits, "mimu4444", "", ""),
 )
-FOLDERS = ("EuRoC",)
+FOLDERS = ("EuRoC", "KITTI", "phyphox", "Sensor Logger")
 """what is read of folders and zip archives"""
 
 NOT_READ: dict[str, Callable[[bytes], bool]] = {
