@@ -13,7 +13,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_head
-from polyins.formats import bundle, euroc, kf_gins, kitti, mimu4444, phone, vectornav, xsens_mt
+from polyins.formats import bundle, euroc, kf_gins, kitti, microstrain, mimu4444, phone, sbg, vectornav, xsens_mt
 from polyins.formats.columns import PARQUET_MAGIC
 from polyins.formats.log import Log
 from polyins.formats.rtklib import has_rows
@@ -82,17 +82,21 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("nmea", "NMEA 0183", _has_nmea, "nmea_log", "", ""),
     LogFormat("xsens-mt", "Xsens MT Manager text", xsens_mt.fits, "xsens_mt", "", ""),
     LogFormat("vectornav", "VectorNav CSV", vectornav.fits, "vectornav", "", ""),
+    LogFormat("microstrain", "MicroStrain MIP Monitor CSV", microstrain.fits, "microstrain", "", ""),
+    LogFormat("sbg", "SBG sbgBasicLogger text", sbg.fits, "sbg", "", ""),
+    LogFormat("navego", "NaveGo .mat (version 5)", _begins(b"MATLAB 5.0"), "navego", "", ""),
+    LogFormat("navego-hdf5", "NaveGo .mat (version 7.3)", _begins(b"MATLAB 7.3"), "navego", "h5py", "matlab"),
     LogFormat("kitti-oxts", "KITTI raw drive (oxts)", kitti.fits, "kitti", "", ""),
     LogFormat("phone", "phyphox or Sensor Logger export", phone.fits, "phone", "", ""),
     LogFormat("euroc", "EuRoC (ASL) folder", euroc.fits, "euroc", "", ""),
     LogFormat("mimu4444", "MIMU4444", mimu4444.fits, "mimu4444", "", ""),
 )
-FOLDERS = ("EuRoC", "KITTI", "phyphox", "Sensor Logger")
+FOLDERS = ("EuRoC", "KITTI", "phyphox", "Sensor Logger", "SBG")
 """what is read of folders and zip archives"""
 
 NOT_READ: dict[str, Callable[[bytes], bool]] = {
     "SQLite": _begins(b"SQLite format 3\0"),
-    "MATLAB or HDF5": _begins(b"MATLAB 5.0", b"\x89HDF\r\n\x1a\n"),
+    "HDF5": _begins(b"\x89HDF\r\n\x1a\n"),
     "a zip archive": _begins(b"PK\x03\x04"),
 }
 """what is known and not read, and how it is known"""
