@@ -54,6 +54,11 @@ def test_the_pose_is_a_reference_and_the_axes_are_known(tmp_path: Path) -> None:
     assert "axes: [x, -y, -z]  # forward, right, down, as the format has them" in text
     assert "gnss:" not in text
     assert "stream: 'pose'" in text.split("reference:")[1]
+    start = text.split("start:")[1]
+    assert "velocity_m_s: [1.0, 2.0, -0.3]" in start
+    assert "roll_pitch_deg: [0.572958, -1.145916]" in start
+    assert "estimate_gyro_bias: false" in start
+    assert "heading_deg: 61.35211" in start
 
 
 @pytest.mark.parametrize("part", ["..", "oxts"])

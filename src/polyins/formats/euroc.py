@@ -25,8 +25,8 @@ HEADER = re.compile(rb"#timestamp( \[ns\])?, ?(w_RS_S_x|p_RS_R_x|p_R?S?_?x)\b")
 VALUES = r"#timestamp.*|(w_RS_S|a_RS_S|p_\w*?|v_RS_R)_[xyz] .*"
 UNITS = {"w_RS_S": "rad s^-1", "a_RS_S": "m s^-2", "v_RS_R": "m s^-1"}
 EARLIEST_UNIX_S = 1e9
-MEASURED = "leica"
-"""begins the names of trackers; other positions are another system's estimates"""
+ESTIMATED = "state_groundtruth"
+"""begins the name of what was estimated afterwards; other positions are measured"""
 TAKEN_FOR_EAST = "its x, y, z are taken for east, north, up: headings count from its y"
 
 
@@ -69,7 +69,7 @@ def read(path: str | Path) -> Log:
         axes={name: one for name in imus if name in calibrated and (one := _named_axes(calibrated[name][0]))},
         points={name: _point(mount) for name, (mount, _) in calibrated.items() if mount is not None},
         noise={name: noise for name in imus if name in calibrated and (noise := calibrated[name][1])},
-        references=frozenset(name for name in tracks if not name.startswith(MEASURED)),
+        references=frozenset(name for name in tracks if name.startswith(ESTIMATED)),
         notes=(*warnings, *(f"{name}: {TAKEN_FOR_EAST}" for name in tracks)),
     )
 

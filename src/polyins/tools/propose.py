@@ -34,6 +34,8 @@ SENSOR_AXES: Axes = ("x", "y", "z")
 FEWEST_SHAKEN = 100
 """rows that tell how much they shake"""
 MEDIAN_TO_STD = 1.4826
+STANDING_M_S = 0.1
+"""less than that a reference says of what stands"""
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
 FORWARD_IS_A_GUESS = "forward is a guess"
@@ -97,7 +99,8 @@ def propose(paths: Sequence[str | Path]) -> str:
         lines += ["", "heading:", *_heading_lines(heading)]
     for speed in speeds[:1]:
         lines += ["", "odometer:", *_odometer_lines(speed)]
-    lines += ["", "start:", _start_line(bool(tracks) and not only_solution, tracks, headings)]
+    given = _given_start(tracks[0], span) if only_solution and not headings else []
+    lines += ["", "start:", *(given or [_start_line(bool(tracks) and not only_solution, tracks, headings)])]
     return "\n".join(lines) + "\n"
 
 
@@ -182,6 +185,24 @@ def _start_line(gnss: bool, tracks: list[LogSource], headings: list[LogSource]) 
     if any(isinstance(one.rows, Track) and one.rows.attitude is not None for one in tracks):
         return f"  heading_from: auto  {CHECK} that of the reference"
     return f"  heading_deg: 0.0  {CHECK} clockwise from north; no file tells it"
+
+
+def _given_start(of: LogSource, span: tuple[float, float]) -> list[str]:
+    """Return the state that a log's reference has when the IMUs begin: without other aids nothing tells it better."""
+    track = of.rows
+    assert isinstance(track, Track)
+    if of.log is None or track.velocity is None or track.attitude is None or track.time[-1] < span[0]:
+        return []
+    row = int(np.searchsorted(track.time, span[0]))
+    roll, pitch, heading = (float(angle) for angle in np.round(track.attitude[row] / DEG, 6))
+    velocity = [float(value) for value in np.round(track.velocity[row], 6)]
+    return [
+        f"  time_s: {float(track.time[row])!r}  {CHECK} the state is that of the reference",
+        f"  velocity_m_s: {_flow(velocity)}",
+        f"  roll_pitch_deg: {_flow([roll, pitch])}",
+        f"  heading_deg: {heading}",
+        *(["  estimate_gyro_bias: false  # it moves"] if np.linalg.norm(velocity) > STANDING_M_S else []),
+    ]
 
 
 def _sensors(read: Sequence[LogSource], kind: str) -> list[LogSource]:
