@@ -42,6 +42,11 @@ def test_lines_of_units_and_columns_that_nobody_asked_for() -> None:
     np.testing.assert_array_equal(rows.of("t", "x"), [[1, 2]])
 
 
+@pytest.mark.parametrize("text", [b"t,x\r\n1,2\r\n3,4\r\n", b"\xef\xbb\xbft,x\n1,2\n3,4\n", b"t,x\n1,2,\n3,4,\n"])
+def test_ends_of_lines_and_marks(text: bytes) -> None:
+    np.testing.assert_array_equal(read_rows("a.csv", text, 0, ",").of("t", "x"), [[1, 2], [3, 4]])
+
+
 def test_a_header_alone() -> None:
     assert len(read_rows("a.csv", b"t,x\n", 0, ",")) == 0
     assert len(read_rows("a.csv", b"t,x", 0, ",")) == 0

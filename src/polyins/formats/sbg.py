@@ -65,7 +65,7 @@ def _contents(path: Path) -> dict[str, bytes]:
 
 def _table(place: str, content: bytes) -> TextRows:
     header, units, _ = (content + b"\n\n").split(b"\n", 2)
-    names = header.decode(errors="replace").strip().split("\t")
+    names = header.decode("utf-8-sig", errors="replace").strip().split("\t")
     if "iso8601Time" in names:
         raise InputError(
             f"{place}: stamps are dates; expected timestamp, which sbgBasicLogger writes without --time-mode"

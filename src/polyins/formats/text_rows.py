@@ -68,7 +68,11 @@ def read_rows(
     rows = content[_offset(content, first) :].rstrip()
     if not rows:
         return TextRows({name: np.zeros(0) for name in places}, first + 1)
-    columns, bad = _columns(rows, delimiter, len(names), places)
+    fields = rows.partition(b"\n")[0].rstrip(b"\r").split(delimiter.encode())
+    ends_empty = (
+        len(fields) == len(names) + 1 and not fields[-1].strip()
+    )  # rows end in a delimiter, the header does not
+    columns, bad = _columns(rows, delimiter, len(names) + ends_empty, places)
     last = rows.count(b"\n")
     for row, why in bad:
         if row != last:
