@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from polyins.errors import InputError
-from polyins.formats.bundle import Bundle, head, is_bundle
+from polyins.formats.bundle import Bundle, head, is_bundle, state
 from polyins.formats.recognize import data_format
 
 
@@ -55,6 +55,13 @@ def test_an_archive_that_is_cut_off(tmp_path: Path) -> None:
     path.write_bytes(whole.replace(b"xxxx", b"xyxx", 1))
     with pytest.raises(InputError, match="cannot be unpacked"):
         Bundle(path).read("imu0/data.csv")
+
+
+def test_a_change_of_a_file_in_a_folder_is_seen(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, "a/imu.csv")
+    before = state(folder)
+    (folder / "a" / "imu.csv").write_text("more than before")
+    assert state(folder) != before
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:

@@ -63,6 +63,13 @@ def test_what_is_damaged_or_cut_off_is_left_out(tmp_path: Path) -> None:
         read(path)
 
 
+def test_a_file_that_begins_within_a_packet(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"".join(packets(10))[50:])
+    assert data_format(path) == "mimu4444"
+    assert len(read(path).imus["imu1"].time) == 9
+
+
 def test_where_the_chips_are(tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
     path.write_bytes(b"".join(packets(5)))

@@ -42,7 +42,9 @@ def rows(lines: Table, mark: str = ",", first: str = "{:.9f}") -> str:
 def vectornav(folder: Path, imu: Table, gnss: Table) -> list[Path]:
     kinds = (("AngularRate", "rad/s"), ("Accel", "m/s^2"))
     names = [f"IMU::{kind}::{axis} [{unit}]" for kind, unit in kinds for axis in "XYZ"]
-    (folder / "imu.csv").write_text(",".join(["GpsTow [s]", *names]) + "\n" + rows(imu + [TOW, 0, 0, 0, 0, 0, 0]))
+    (folder / "imu.csv").write_text(
+        ",".join(["GpsTow [s]", *names]) + "\n" + rows(imu + np.array([TOW, 0, 0, 0, 0, 0, 0]))
+    )
     place = [f"GNSS1::PosLla::{name}" for name in ("latitude [deg]", "longitude [deg]", "altitude [m]")]
     names = [f"GNSS1::{kind}::{axis} [{unit}]" for kind, unit in (("PosU", "m"), ("VelNed", "m/s")) for axis in "NED"]
     late = gnss[:, 0] + TOW + 0.07

@@ -88,6 +88,13 @@ def head(path: str | Path, count: int) -> bytes:
     return LISTING + "\n".join(Bundle(find(path)).names).encode()
 
 
+def state(path: Path) -> tuple[int, int]:
+    """Return when a file, or the last of those in a folder, changed, ns, and the size of all."""
+    files = [path / name for name in Bundle(path).names] if path.is_dir() else [path]
+    known = [find(file).stat() for file in files]
+    return max((one.st_mtime_ns for one in known), default=0), sum(one.st_size for one in known)
+
+
 def _archive(path: Path) -> ZipFile:
     try:
         return ZipFile(path)

@@ -43,10 +43,10 @@ POSITIONS = "IMU_positions.csv"
 
 
 def fits(head: bytes) -> bool:
-    """Whether two packets follow each other near the beginning."""
+    """Whether two packets follow each other near the beginning, which may be within one."""
     marks, size = b"\xaa\x64\xaa\x64", PACKET.itemsize
     return any(
-        bytes(head[k + n] for n in (0, 3, size, size + 3)) == marks for k in range(8) if len(head) > k + size + 3
+        bytes(head[k + n] for n in (0, 3, size, size + 3)) == marks for k in range(min(2 * size, len(head) - size - 3))
     )
 
 

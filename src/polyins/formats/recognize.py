@@ -150,8 +150,7 @@ def read_log(path: str | Path) -> Log:
     Raises InputError if it is none, is damaged, or the library that reads it is missing.
     """
     found = find(path)
-    state = found.stat()
-    return _read_log(found, state.st_mtime_ns, state.st_size)
+    return _read_log(found, *bundle.state(found))
 
 
 @lru_cache(maxsize=2)
