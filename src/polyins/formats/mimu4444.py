@@ -38,6 +38,7 @@ ACCEL_M_S2 = 9.80665 / 2048.0
 GYRO_RAD_S = DEG / 16.4
 FULL_SCALE = 32760
 """counts, from which on a rate is at the end of the range: not every chip reaches the last ones"""
+FULL_SCALE_DEG_S = 32767 / 16.4
 OTHER_SIDE: Axes = ("-y", "-x", "-z")
 POSITIONS = "IMU_positions.csv"
 
@@ -66,6 +67,7 @@ def read(path: str | Path) -> Log:
         name: replace(
             rates_to_rows(found, name, time, rates[:, chip] * GYRO_RAD_S, forces[:, chip] * ACCEL_M_S2),
             units_known=True,
+            gyro_range_deg_s=FULL_SCALE_DEG_S,
         )
         for chip, name in enumerate(names)
     }

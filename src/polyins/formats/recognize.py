@@ -119,7 +119,7 @@ def data_format(path: str | Path) -> str:
             raise InputError(f"{find(path)}: looks like {title}, which is not read; expected {readable()}")
     if not kf_gins.is_text(content):
         return _binary(path, content)
-    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    lines = content.decode("utf-8-sig", errors="replace").splitlines() or [""]
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
         return "xsens-dot"

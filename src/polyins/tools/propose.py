@@ -16,7 +16,7 @@ from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
-from polyins.formats.rows import ImuRows, SensorRows, Track
+from polyins.formats.rows import ImuRows, SensorRows, Track, intervals
 from polyins.model.axes import axes_matrix, composed, right_handed_axes
 from polyins.model.findings import Finding
 from polyins.model.recording import Recording, usual_interval
@@ -34,6 +34,8 @@ SENSOR_AXES: Axes = ("x", "y", "z")
 FEWEST_SHAKEN = 100
 """rows that tell how much they shake"""
 MEDIAN_TO_STD = 1.4826
+SLOWEST_RAD_S = 0.1
+"""less than that hardly turns: biases of cheap gyros are as large"""
 STANDING_M_S = 0.1
 """less than that a reference says of what stands"""
 HEADING_STD_DEG = 5.0
@@ -291,13 +293,18 @@ def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) 
 
 
 def _shared_axes(log: Log) -> Axes:
-    """Return which of the axes that a log's IMUs share point forward, right, down, by their mean force."""
-    forces = [
-        axes_matrix(log.axes.get(name, SENSOR_AXES)) @ np.array(describe(rows)["accel_mean_m_s2"] or [0.0, 0.0, 0.0])
-        for name, rows in log.imus.items()
-    ]
+    """Return which of the axes that a log's IMUs share point forward, right, down, by their force while they rest."""
+    forces = [axes_matrix(log.axes.get(name, SENSOR_AXES)) @ _force_at_rest(rows) for name, rows in log.imus.items()]
     force = np.mean(forces, axis=0)
     return SENSOR_AXES if log.upright or not force.any() else upright_axes(SENSOR_AXES, force)
+
+
+def _force_at_rest(rows: ImuRows) -> np.ndarray:
+    """Return the mean specific force, shape (3,), of the rows that hardly turn; of all if these are few."""
+    steps = intervals(rows.time)
+    resting = np.linalg.norm(rows.dtheta, axis=1) < SLOWEST_RAD_S * steps
+    chosen = resting if resting.sum() >= FEWEST_SHAKEN else steps > 0.0
+    return np.asarray(rows.dvel[chosen].sum(axis=0) / max(float(steps[chosen].sum()), 1e-9))
 
 
 def _point_line(key: str, of: LogSource) -> str:
