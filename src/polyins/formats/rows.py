@@ -41,6 +41,8 @@ class ImuRows:
     """the unit in the file: rad or deg are increments, rad/s or deg/s rates"""
     accel_unit: str = "m/s"
     """m/s is increments, m/s^2 or g rates"""
+    units_known: bool = False
+    """they are constants of the format, so that no size of the values speaks against them"""
     gyro_range_deg_s: float | None = None
     """full scale, where the format is that of one sensor"""
     warnings: tuple[str, ...] = ()
