@@ -135,7 +135,7 @@ def _stretched(
         )
         solution, known = batch.navigated(run)
         yield replace(solution, findings=found), known
-        if known.broken:
+        if known.ended:
             return
     if run is None:
         raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")
