@@ -82,7 +82,8 @@ def run(
                 part, errors = _thinned(part, errors, float(share))
             shown.append((part, errors))
         solution = Solution.joined([part for part, _ in shown])
-        found = replace(solution, findings=(*solution.findings, *of_measurements(solution.measurements)))
+        told = solution.findings
+        found = replace(solution, findings=(*told, *of_measurements(solution.measurements, told)))
         for writer in writers:
             writer.finish(found)
     judged = [errors for _, errors in shown if errors is not None]
