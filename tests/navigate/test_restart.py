@@ -12,6 +12,7 @@ from playing import Event, events, feed, navigator_for, play, rows
 
 from polyins.evaluation.errors import compare_to_reference
 from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import GnssStream, ImuStream, Recording
 from polyins.model.status import STATUSES
 from polyins.navigate import batch, restart
@@ -203,3 +204,52 @@ def test_wheels_without_gnss_that_begin_anew_so_are_not_to_be_used() -> None:
     (finding,) = [found for found in whole.findings if found.kind == "restart"]
     assert finding.severity == "serious"
     assert whole.time[-1] > 110.0
+
+
+@pytest.fixture(scope="module")
+def misled(drive: Recording) -> Recording:
+    """A drive whose heading is given, wrong by 90 degrees."""
+    reference = drive.reference
+    assert reference is not None
+    assert reference.attitude is not None
+    heading = float(reference.attitude[0, 2]) + np.pi / 2.0
+    return replace(drive, start=replace(drive.start, heading=heading, heading_from="value"))
+
+
+def test_where_resets_do_not_help_the_run_begins_anew(misled: Recording) -> None:
+    whole = batch.run(misled, "enav-fusion")
+    (finding,) = [found for found in whole.findings if found.kind == "restart"]
+    assert finding.severity == "doubt"
+    assert "resets of the position do not help" in finding.text
+    assert finding.to_s is not None
+    errors = compare_to_reference(whole, misled.reference)
+    assert errors.attitude is not None
+    later = errors.time > finding.to_s + 30.0
+    assert later.sum() > 1000
+    assert errors.horizontal[later].max() < 0.3
+    assert np.degrees(np.abs(errors.attitude[later, 2])).max() < 1.5
+    assert errors.horizontal[errors.time < finding.to_s - 10.0].max() > 50.0
+
+
+def test_live_it_begins_anew_as_a_run_does(misled: Recording) -> None:
+    one, whole = navigator(misled), batch.run(misled, "enav-fusion")
+    (finding,) = [found for found in whole.findings if found.kind == "restart"]
+    assert finding.to_s is not None
+    end = finding.to_s + 40.0
+    states = play(one, misled, until(misled, end))
+    time = np.array(list(states))
+    place = np.searchsorted(whole.time, time)
+    np.testing.assert_array_equal(whole.time[place], time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole)[place])
+    assert np.count_nonzero(time > finding.to_s) > 1000
+    assert finding in one.findings
+
+
+def test_a_step_that_is_followed_is_no_reason_to_begin_anew(drive: Recording) -> None:
+    gnss = drive.gnss
+    assert gnss is not None
+    position = gnss.position.copy()
+    position[gnss.time > 100.0] += np.array([50.0, 0.0, 0.0]) / metres_per_unit(position[0], True)
+    solution = batch.run(replace(drive, gnss=replace(gnss, position=position)), "enav-fusion")
+    assert solution.innovations.reset.sum() == 1
+    assert not [found for found in solution.findings if found.kind == "restart"]

@@ -6,7 +6,8 @@ difference of two changes is the noise alone, of three fixes, and its variance s
 than the receiver states, the noise that was found is used. A fix that neither the stated noise nor an error of
 the prediction explains begins a series; while the innovation stays what it was the fixes of the series agree with each
 other and not with the past, and weigh next to nothing. If the series lasts, the receiver is right: the position, and
-nothing else, is set to it.
+nothing else, is set to it. Where fixes go on to disagree by many sigma, or reset follows reset, it is not the position
+that is wrong: the state is given up, and the run begins anew, see `restart`.
 
 What the prediction states is measured by the fixes before: where those that were believed disagreed with it by many
 times what was stated, as they do if they are late or the heading is wrong, a fix that disagrees as much is no news, and
@@ -33,6 +34,12 @@ MEDIAN_OF_NIS = 2.366
 """of three components, for innovations that are what is stated"""
 WRONG = 9.0
 """times that median, from which it is the prediction that disagrees: innovations are three times as large as stated"""
+LOST = 100.0
+"""times that median, from which a reset has not helped: innovations are ten times as large as stated"""
+HELPED = 33.0
+"""fixes after a reset that did not disagree so: at first its own variances cover much"""
+MOST_RESETS = 3
+"""in a row: what they leave as it is, velocity, attitude and biases, is wrong"""
 TOO_SURE = 16.0
 """times the stated variance, from which the one that was found is used"""
 LEAST_VARIANCE = 0.005**2
@@ -47,11 +54,13 @@ SMALL, SMALL_LASTS, LASTS = 20.0, 10.0, 14.95
 CHANGES, COUNT, AFTER, SPREAD, KNOWN, LAST = 0, 33, 34, 37, 40, 41
 SERIES, SINCE, OFFSET, DOUBTS, BEFORE, CHANGED, FIRST, SPEED_VARIANCE = 42, 43, 44, 47, 48, 51, 52, 53
 BELIEVED, DISAGREED = 54, 55
+RESETS, SINCE_RESET, IS_HOPELESS, HOPELESS_AT = 66, 67, 68, 69
 """places in the receiver's part of the scalars: differences of changes, how many were noted; the innovation, and its
 variance by the prediction, after the last update; whether there was one, and when; whether a series lasts, since when,
 and what began it; how many fixes have to be good until one that is wrong is an exception again; the last change, and
 whether there was one; when the first of the latest doubts was; the variance that a reset gives the velocity, or 0; how
-many fixes were believed, and by how many sigma each of the last ones disagreed with the prediction"""
+many fixes were believed, and by how many sigma each of the last ones disagreed with the prediction; resets of which
+none has helped yet, and fixes that were believed since the last one; whether the state is given up, and when"""
 
 LOCKED_OUT = 30.0
 """s of doubts without a fix that is believed, after which it is the prediction that is wrong"""
@@ -130,6 +139,28 @@ def note_believed(scalars: Array, nis: float) -> None:
     row = int(scalars[RECEIVER + BELIEVED]) % RING
     scalars[RECEIVER + DISAGREED + row] = math.sqrt(nis)
     scalars[RECEIVER + BELIEVED] += 1.0
+    scalars[RECEIVER + SINCE_RESET] += 1.0
+    if scalars[RECEIVER + RESETS] == 0.0 or scalars[RECEIVER + SINCE_RESET] < RING:
+        return
+    if disagreement(scalars) > LOST:
+        _give_up(scalars)
+    elif scalars[RECEIVER + SINCE_RESET] >= HELPED:
+        scalars[RECEIVER + RESETS] = 0.0
+
+
+@scalar_kernel
+def note_reset(scalars: Array) -> None:
+    """Note that the position was set to a fix."""
+    scalars[RECEIVER + RESETS] += 1.0
+    scalars[RECEIVER + SINCE_RESET] = 0.0
+    if scalars[RECEIVER + RESETS] >= MOST_RESETS:
+        _give_up(scalars)
+
+
+@scalar_kernel
+def _give_up(scalars: Array) -> None:
+    if scalars[RECEIVER + IS_HOPELESS] == 0.0:
+        scalars[RECEIVER + IS_HOPELESS], scalars[RECEIVER + HOPELESS_AT] = 1.0, scalars[TIME]
 
 
 @scalar_kernel

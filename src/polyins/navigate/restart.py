@@ -26,9 +26,9 @@ from polyins.prepare.alignment import Start
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
-NO_DATA, BROKEN = "no IMU has data", "the state is no number"
+NO_DATA, BROKEN, HOPELESS_STATE = "no IMU has data", "the state is no number", "resets of the position do not help"
 SETTLED = 1.0
-"""s after a state that is no number, which the run before it has seen"""
+"""s after a state that is no number or is given up, which the run before it has seen"""
 
 
 class Pause(NamedTuple):
@@ -74,8 +74,8 @@ class Known:
     """m"""
     imu_errors: dict[str, tuple[Array, Array]]
     """of each IMU by its name, and their std, (12,) each"""
-    broken: bool = False
-    """whether the state is no number at the epoch after it"""
+    ended: str = ""
+    """why the run ended there though its data went on"""
 
 
 def hopeless(on_wheels: bool, fixes: bool) -> float:
@@ -111,7 +111,7 @@ def parts_of(recording: Recording, found: Sequence[Pause]) -> Iterator[tuple[Pau
 
 
 def rest_of(part: Recording, pause: Pause) -> Recording:
-    """Return what is left of a part after a state that is no number."""
+    """Return what is left of a part after a state that is no number or was given up."""
     return part_of(part, np.nextafter(pause.end, -np.inf), np.inf, pause)
 
 
@@ -142,14 +142,14 @@ def run_parts(
     while following is not None:
         pause, part = following
         begun = False
-        broken: Known | None = None
+        ended: Known | None = None
         try:
             for solution, knowing in run(part, before, pause):
                 if held is not None:
                     yield held
                 if not begun and pause is not None:
                     told = (*told, restarted(pause, solution.start))
-                begun, broken, first = True, knowing if knowing.broken else None, first or solution.start
+                begun, ended, first = True, knowing if knowing.ended else None, first or solution.start
                 found = (*told, *(one for one in solution.findings if one not in told))
                 held = replace(solution, start=first, findings=found)
         except InputError as error:
@@ -159,8 +159,8 @@ def run_parts(
             told = told if pause is None else (*told, left_out(pause, str(error)))
         else:
             told, before = told if held is None else held.findings, knowing
-        if broken is not None:
-            pause = Pause(broken.time, broken.time + SETTLED, BROKEN)
+        if ended is not None:
+            pause = Pause(ended.time, ended.time + SETTLED, ended.ended)
             following = pause, rest(part, pause)
         else:
             following = next(ahead, None)

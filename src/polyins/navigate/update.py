@@ -316,6 +316,7 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) 
         receiver.begin_series(scalars, innovation)
     if (of_series and receiver.has_lasted(scalars)) or receiver.is_locked_out(scalars, innovation):
         scalars[RECEIVER + receiver.SERIES] = scalars[RECEIVER + receiver.DOUBTS] = 0.0
+        receiver.note_reset(scalars)
         return RESET
     receiver.doubt(work.measurement, innovation, of_series)
     return DEWEIGHTED

@@ -107,7 +107,8 @@ def _of_imus(rig: Rig, blocks: Blocks) -> Iterator[Finding]:
         for part in parts:
             if blocks.whole[part, i].mean() < 0.9:
                 continue
-            told = _lag(blocks.rates[part, :3, i], blocks.middle[part, :3], blocks.interval)
+            own = np.ascontiguousarray(blocks.rates[part, :3, i].T)
+            told = _lag(own, np.ascontiguousarray(blocks.middle[part, :3].T), blocks.interval)
             if told is not None:
                 found.append(_Delay(float(blocks.time[part][0]), float(blocks.time[part][-1]), *told))
         off = [one for one in found if abs(one.delay) > max(LEAST_IMU_DELAY, SURE * one.std)]
@@ -120,28 +121,28 @@ def _of_imus(rig: Rig, blocks: Blocks) -> Iterator[Finding]:
 
 
 def _lag(own: Array, mean: Array, interval: float) -> tuple[float, float] | None:
-    """Return by how much one signal, shape (K, 3), is later than another, s, and how sure that is; None: not told.
+    """Return by how much one signal, shape (3, K), is later than another, s, and how sure that is; None: not told.
 
     own(t + D) = mean(t). D is m where the mean square of own(t + m) - mean(t) is least, of means over some blocks; near
     it own(t + m) - mean(t) = (m - D) d mean / dt, which least squares solve.
     """
-    reach, count = round(FARTHEST / interval) // COARSE, len(own) // COARSE
+    reach, count = round(FARTHEST / interval) // COARSE, own.shape[1] // COARSE
     if count < 4 * reach:
         return None
-    own, mean = (one[: count * COARSE] - one.mean(axis=0) for one in (own, mean))
+    own, mean = (one[:, : count * COARSE] - one.mean(axis=1, keepdims=True) for one in (own, mean))
     power = float(np.mean(mean**2))
     if np.sqrt(3.0 * power) < LEAST_TURNING:
         return None
-    rough_own, rough_mean = (one.reshape(count, COARSE, 3).mean(axis=1) for one in (own, mean))
+    rough_own, rough_mean = (one.reshape(3, count, COARSE).mean(axis=2) for one in (own, mean))
     best = int(np.argmin(_misfits(rough_own, rough_mean, reach)))
     if not 0 < best < 2 * reach:
         return None
-    margin = reach * COARSE
-    inside = slice(margin, len(mean) - margin)
-    slope = (mean[margin + 1 : len(mean) - margin + 1] - mean[margin - 1 : len(mean) - margin - 1]) / (2.0 * interval)
+    margin, length = reach * COARSE, mean.shape[1]
+    inside = slice(margin, length - margin)
+    slope = (mean[:, margin + 1 : length - margin + 1] - mean[:, margin - 1 : length - margin - 1]) / (2.0 * interval)
     steepness, m = float(np.sum(slope**2)), (best - reach) * COARSE
     for _ in range(STEPS):
-        off = own[inside.start + m : inside.stop + m] - mean[inside]
+        off = own[:, inside.start + m : inside.stop + m] - mean[:, inside]
         less = float(np.sum(off * slope)) / steepness
         delay, m = m * interval - less, m - round(less / interval)
         if abs(m) > margin:
@@ -152,10 +153,10 @@ def _lag(own: Array, mean: Array, interval: float) -> tuple[float, float] | None
 
 def _misfits(own: Array, mean: Array, reach: int) -> Array:
     """Return the mean squares of own(t + m) - mean(t) for m from -reach to reach; t keeps that from both ends."""
-    known = mean[reach:-reach]
-    products = sum(np.correlate(own[:, a], known[:, a], "valid") for a in range(3))
-    squares = np.concatenate([[0.0], np.cumsum(np.sum(own**2, axis=1))])
-    return np.asarray(squares[len(known) :] - squares[: -len(known)] - 2.0 * products + np.sum(known**2)) / known.size
+    known = mean[:, reach:-reach]
+    products = sum(np.correlate(own[a], known[a], "valid") for a in range(3))
+    squares, length = np.concatenate([[0.0], np.cumsum(np.sum(own**2, axis=0))]), known.shape[1]
+    return np.asarray(squares[length:] - squares[:-length] - 2.0 * products + np.sum(known**2)) / known.size
 
 
 # --- fixes ------------------------------------------------------------------------------------------------------------

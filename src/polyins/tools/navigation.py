@@ -83,7 +83,8 @@ def run(
                 part, errors = _thinned(part, errors, float(share))
             shown.append((part, errors))
         solution = Solution.joined([part for part, _ in shown])
-        found = replace(solution, findings=(*solution.findings, *of_measurements(solution.measurements)))
+        told = solution.findings
+        found = replace(solution, findings=(*told, *of_measurements(solution.measurements, told)))
         for writer in writers:
             writer.finish(found)
     judged = [errors for _, errors in shown if errors is not None]
@@ -137,7 +138,7 @@ def _stretched(
         )
         solution, known = batch.navigated(run)
         yield replace(solution, findings=found), known
-        if known.broken:
+        if known.ended:
             return
     if run is None:
         raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")

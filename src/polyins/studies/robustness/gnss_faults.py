@@ -12,7 +12,8 @@ from polyins.studies.robustness.fault import Array, Draw, Fault, Mask, during, f
 
 OFF = ("jump", "reset", "rejected")
 DELAY = ("delay", "clock")
-PLACE = ("jump",)
+PLACE = ("place", "jump")
+UNITS = ("units",)
 WEEK_S = 604800.0
 FOOT = 0.3048
 
@@ -144,11 +145,11 @@ FAULTS = (
         (), "latitude",
     ),
     _gnss("latitude and longitude swapped for 5 s", partial(_values, length=5.0, change=_swapped), PLACE, "latitude"),
-    _gnss("height in feet for 10 s", partial(_values, length=10.0, change=partial(_times, factor=1.0 / FOOT)), PLACE),
-    _gnss("angles 1e-7 deg for 5 s", partial(_values, length=5.0, change=_is(NEAR_ZERO, NEAR_ZERO, None)), PLACE),
+    _gnss("height in feet for 10 s", partial(_values, length=10.0, change=partial(_times, factor=1.0 / FOOT)), UNITS),
+    _gnss("angles 1e-7 deg for 5 s", partial(_values, length=5.0, change=_is(NEAR_ZERO, NEAR_ZERO, None)), ("place",)),
     _gnss("angles times 1e7 for 5 s", partial(_values, length=5.0, change=partial(_angles_times, factor=1e7)),
           PLACE, "latitude"),
-    _gnss("height in mm for 5 s", partial(_values, length=5.0, change=partial(_times, factor=1e3)), PLACE, "height"),
+    _gnss("height in mm for 5 s", partial(_values, length=5.0, change=partial(_times, factor=1e3)), UNITS, "height"),
     _gnss("NaN in one fix", partial(_values, length=1.0, change=_is(np.nan, np.nan, np.nan)), (), "number"),
     _gnss("NaN for 10 s", partial(_values, length=10.0, change=_is(np.nan, np.nan, np.nan)), (), "number"),
     _gnss("(0, 0) in one fix", partial(_values, length=1.0, change=_is(0.0, 0.0, None)), PLACE, "latitude"),
