@@ -149,21 +149,63 @@ def test_a_bridged_pause_is_covered(drive: Recording, method: str) -> None:
         assert std[near][0, 2] > np.radians(1.0)
 
 
-def test_blocks_apart_that_coasted_without_gnss_do_not_hold_it() -> None:
-    recording = paused(driven_vehicle.drive(), *COASTED)
-    for method, expected in (("triple-ins", ["serious"]), ("body-ins", []), ("triple-ins/centralized", [])):
-        found = [one for one in batch.run(recording, method).findings if one.kind == "pause"]
-        assert [one.severity for one in found] == expected
+def over_std(solution: batch.Solution, recording: Recording) -> np.ndarray:
+    """The larger one of horizontal position and heading over its standard deviation."""
+    assert recording.reference is not None
+    errors = compare_to_reference(solution, recording.reference)
+    assert errors.attitude is not None
+    rows = errors.covered
+    variance = euler_variance(euler_angles(solution.attitude[rows]), solution.phi_covariance[rows])
+    heading = np.abs(errors.attitude[:, 2]) / np.sqrt(variance[:, 2])
+    return np.maximum(heading, errors.horizontal / np.sqrt(solution.position_variance[rows, :2].sum(axis=1)))
 
 
-def test_live_wheels_coast_as_in_a_batch_run() -> None:
+@pytest.mark.parametrize("length", [0.9, 2.3, 12.0])
+@pytest.mark.parametrize("method", ["triple-ins", "body-ins", "triple-ins/centralized"])
+def test_wheels_without_gnss_go_on_as_unsure_as_a_pause_leaves_them(method: str, length: float) -> None:
+    recording = paused(driven_vehicle.drive(), 60.0, 60.0 + length)
+    solution = batch.run(recording, method)
+    (finding,) = [one for one in solution.findings if one.kind == "restart"]
+    assert finding.severity == ("note" if length < restart.STRAIGHT else "serious")
+    after = solution.time > 60.0 + length
+    assert solution.time[after][0] < 60.0 + length + 0.6
+    assert solution.time[-1] > 119.0
+    assert over_std(solution, recording)[after].max() < 4.0
+    heading_std = np.sqrt(solution.phi_covariance[after, 5])
+    assert heading_std.min() > 0.9 * min(restart.TURN_RATE * length, restart.ANY_HEADING)
+    assert np.sqrt(solution.position_variance[after, :2].sum(axis=1)).min() > 0.4 * length
+
+
+def test_live_wheels_go_on_as_in_a_batch_run(tmp_path: Path) -> None:
     recording = paused(driven_vehicle.drive(), *COASTED)
     prepared, whole = batch.prepare(recording, "triple-ins"), batch.run(recording, "triple-ins")
+    played = events(prepared.recording)
     one = navigator_for(prepared)
-    states = play(one, prepared.recording, events(prepared.recording))
-    np.testing.assert_array_equal(list(states), whole.time)
-    np.testing.assert_array_equal(list(states.values()), rows(whole))
-    assert {found.text for found in one.findings} == {found.text for found in whole.findings}
+    states = play(one, prepared.recording, [event for event in played if event.arrives < 90.0])
+    one.save(tmp_path / "checkpoint")
+    resumed = Navigator.resume(tmp_path / "checkpoint")
+    states |= play(resumed, prepared.recording, [event for event in played if event.arrives >= 90.0])
+    time = np.array(list(states))
+    place = np.searchsorted(whole.time, time)
+    np.testing.assert_array_equal(whole.time[place], time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole)[place])
+    assert np.count_nonzero(time > 90.0) > 5000
+    assert {found.text for found in resumed.findings} == {found.text for found in whole.findings}
+
+
+@pytest.mark.parametrize("length", [1.0, 10.0])
+def test_wheels_with_gnss_begin_anew_under_way(length: float) -> None:
+    recording = paused(driven_vehicle.drive(gnss=True), 50.0, 50.0 + length)
+    assert recording.gnss is not None
+    solution = batch.run(recording, "triple-ins")
+    (finding,) = [one for one in solution.findings if one.kind == "restart"]
+    assert finding.severity == "note"
+    after = solution.time > 50.0 + length
+    assert solution.time[after][0] < 50.0 + length + 2.0
+    assert solution.time[-1] > 119.0
+    over = over_std(solution, recording)[after]
+    assert (over < 3.0).mean() > 0.98
+    assert over.max() < 5.0
 
 
 @pytest.fixture

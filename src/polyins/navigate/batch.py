@@ -96,6 +96,11 @@ class Prepared:
         """What some runs need besides."""
         return further_work(self.state, self.plan)
 
+    def stated(self, rows: slice | list[int]) -> Array:
+        """Return the variances of some epochs, with what is unknown of the place and heading that they go on from."""
+        states, variances = self.outputs.states[rows], self.outputs.variances[rows]
+        return restart.with_datum(states, variances, self.start, self.recording.geodetic)
+
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
         further, epochs = self.further, slice(first, last)
@@ -155,7 +160,7 @@ def known(run: Prepared, last: int, *, ended: str = "") -> restart.Known:
 
     A run whose state is no number, or is given up, knows of its IMUs what it began with.
     """
-    row, variance = run.outputs.states[last], run.outputs.variances[last]
+    row, variance = run.outputs.states[last], run.stated([last])[0]
     begun = zip(run.recording.rig.imus, run.start.imu_errors, run.start.imu_error_std, strict=True)
     return restart.Known(
         time=float(run.inputs.time[last]),
@@ -163,6 +168,7 @@ def known(run: Prepared, last: int, *, ended: str = "") -> restart.Known:
         velocity=row[3:6].copy(),
         heading=float(euler_angles(row[None, 6:10])[0, 2]),
         position_std=np.sqrt(variance[0:3]),
+        heading_std=float(np.sqrt(variance[11])),
         imu_errors={imu.name: (own, std) for imu, own, std in begun} if ended else _imu_errors(run),
         ended=ended,
     )
@@ -258,7 +264,9 @@ def find_start(recording: Recording, method: str = "enav-fusion", *, imu: int = 
 def start_of(row: Method, recording: Recording, aligned: Aligned, before: restart.Known | None = None) -> Start:
     """Find the start of a method over a recording whose IMUs are on one time base; `before`: see `prepare`."""
     start = search.find(recording, aligned, lambda blind: run(blind, row.name))
-    return restart.as_lost(start, before) if before is not None and restart.is_lost(recording) else start
+    if before is None or not restart.is_lost(recording):
+        return start
+    return restart.as_lost(start, before, recording.geodetic)
 
 
 def lay_out(
@@ -374,7 +382,7 @@ def empty_outputs(inputs: Inputs, plan: Plan, errors: int) -> Outputs:
 def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0) -> Solution:
     """Return what a run has written, as a solution."""
     recording, aligned, outputs = run.recording, run.aligned, run.outputs
-    states, variances = outputs.states[1:], outputs.variances[1:]
+    states, variances = outputs.states[1:], run.stated(slice(1, None))
     track = Trajectory(
         time=aligned.time[1:],
         position=states[:, 0:3],

@@ -287,7 +287,7 @@ class Navigator:
         """Go on after a pause, which began at `last`, s, or anew if it was hopeless."""
         first = self._ahead.first
         held = self._ahead.in_order(self._recording.options.gnss_snap)
-        if first - last > restart.hopeless(self._recording.rig.has_wheels, self._has_fixes):
+        if first - last > restart.hopeless(self._recording.rig.has_wheels):
             self._begin_anew(last, first)
         else:
             self._assembly.newest = first
@@ -663,7 +663,7 @@ def _states(line: Timeline, first: int) -> list[NavigatorState]:
     time, rows, variances = (
         line.inputs.time[here],
         line.outputs.states[here].copy(),
-        line.outputs.variances[here].copy(),
+        line.run.stated(here).copy(),
     )
     time, position, velocity, attitude = line.inputs.time[here], rows[:, 0:3], rows[:, 3:6], rows[:, 6:10]
     track = Trajectory(time, position, velocity, attitude, variances[:, 0:3], variances[:, 3:6], variances[:, 6:12])

@@ -14,6 +14,7 @@ from polyins.studies.robustness.fault import Draw, Fault, unchanged, with_imu, w
 
 SLIP = ("slip", "wheel")
 SICK = ("left out", "silent", "gap", "disagreement", "slip")
+ALL_SILENT = ("pause", "restart", *SICK)
 WORDS = ("spin", "wheel", "same values", "number")
 
 
@@ -110,6 +111,8 @@ def _slips(name: str, size: float, length: float, all_wheels: bool) -> Fault:
 
 def _parts(name: str, names: tuple[str, ...], length: float, value: str) -> Fault:
     inject = partial(_part, names=names, length=length, value=value)
+    if len(names) > 1:
+        return Fault(name, "wheel", inject, ALL_SILENT, WORDS)
     return Fault(name, "wheel", inject, SICK, WORDS, whose=names[0])
 
 
