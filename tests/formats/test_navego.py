@@ -115,6 +115,14 @@ def test_what_is_none_of_it_is_refused(tmp_path: Path) -> None:
         read(path)
 
 
+def test_random_bytes_after_the_signature(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    path.write_bytes(b"MATLAB 5.0 MAT-file" + np.random.default_rng(2).bytes(16800))
+    assert data_format(path) == "navego"
+    with pytest.raises(InputError, match="cannot be read as MATLAB"):
+        read(path)
+
+
 @pytest.mark.parametrize("version", ["5", "7.3"])
 def test_files_that_are_cut_off(version: str, tmp_path: Path) -> None:
     path = tmp_path / "a.mat"

@@ -17,7 +17,7 @@ from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.log import Log, rates_to_rows, rising
 from polyins.formats.rows import RowSource, SensorRows
-from polyins.formats.text_rows import TextRows, header_line, read_rows
+from polyins.formats.text_rows import TextRows, header_line, lines_before, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -52,9 +52,8 @@ def read(path: str | Path) -> Log:
     header = header_line(content, HEADER)
     if header is None:
         raise InputError(f"{found}: no header with Acc_X and Gyr_X; expected an export of MT Manager")
-    lines = content.split(b"\n", header + 1)
-    delimiter = next(mark for mark in "\t;," if mark.encode() in lines[header])
-    comments = b"\n".join(lines[:header]).decode(errors="replace")
+    *comments, names = lines_before(content, header)
+    delimiter = next(mark for mark in "\t;," if mark in names)
     rows = read_rows(str(found), content, header, delimiter, wanted=VALUES)
     if not rows.has(*RATES, *FORCES):
         raise InputError(f"{found}: no row has rates and accelerations; expected Acc_X, ... and Gyr_X, ...")
@@ -70,13 +69,13 @@ def read(path: str | Path) -> Log:
     )
 
 
-def _told(comments: str, pattern: str) -> float | None:
-    found = re.search(pattern, comments)
+def _told(comments: list[str], pattern: str) -> float | None:
+    found = re.search(pattern, "\n".join(comments))
     return float(found[1]) if found else None
 
 
-def _frame(comments: str) -> str | None:
-    found = re.search(r"Coordinate system: *(\w+)", comments)
+def _frame(comments: list[str]) -> str | None:
+    found = re.search(r"Coordinate system: *(\w+)", "\n".join(comments))
     return found[1] if found else None
 
 
