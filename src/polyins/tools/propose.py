@@ -95,7 +95,7 @@ def propose(paths: Sequence[str | Path]) -> str:
         tracks.insert(1, tracks.pop())
     sections = ["reference"] if only_solution else ["gnss", "reference"]
     for section, track in zip(sections, tracks, strict=False):
-        lines += ["", f"{section}:", *_track_lines(section, track, span)]
+        lines += ["", f"{section}:", *_track_lines(section, track, span, imus[0].log)]
     lines += [f"{CHECK} {one.place} also holds positions and is not used" for one in tracks[len(sections) :]]
     for heading in headings[:1]:
         lines += ["", "heading:", *_heading_lines(heading)]
@@ -364,7 +364,7 @@ def _format_lines(of: LogSource, indent: str) -> list[str]:
     return lines
 
 
-def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list[str]:
+def _track_lines(section: str, of: LogSource, span: tuple[float, float], base: Log | None) -> list[str]:
     track = of.rows
     assert isinstance(track, Track)
     facts = describe(track)
@@ -372,7 +372,7 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list
         f"  file: {_quoted(of.path)}",
         *_format_lines(of, "  "),
         f"  # {facts['rows']} rows, {facts['begin_s']:.3f} to {facts['end_s']:.3f} s, {facts['rate_hz'] or 0.0:.2f} Hz",
-        _clock_line(of, span),
+        _clock_line(of, span, base),
     ]
     antenna = of.log.antenna if of.log else None
     if section == "gnss" and antenna is not None:
@@ -386,8 +386,10 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list
     return lines
 
 
-def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
+def _clock_line(of: LogSource, span: tuple[float, float], base: Log | None) -> str:
     time = of.rows.time
+    if (apart := _between_clocks(of.log, base)) is not None:
+        return f"  clock_offset_s: {apart!r}  {CHECK} from the clock of one log to that of the other, by UTC"
     if of.log is not None and of.log.fix_age is not None:
         return f"  clock_offset_s: {-of.log.fix_age:g}  {CHECK} how old fixes are when they are stamped, by the log"
     if time[-1] < span[0] or time[0] > span[1]:
@@ -396,6 +398,15 @@ def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
             "brings these to the same clock"
         )
     return f"  clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s"
+
+
+def _between_clocks(of: Log | None, base: Log | None) -> float | None:
+    """Return what brings stamps of a log to the clock of another, s, if they differ and both count from a known UTC."""
+    if of is None or base is None or of.utc_of_zero is None or base.utc_of_zero is None:
+        return None
+    apart = of.utc_of_zero - base.utc_of_zero
+    known = {of.clock, base.clock} <= {"unix", "gps-week"}
+    return apart if known and abs(apart) > 1e-6 else None
 
 
 def _heading_lines(of: LogSource) -> list[str]:
