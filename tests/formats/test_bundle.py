@@ -34,8 +34,18 @@ def test_names_and_contents(tmp_path: Path) -> None:
     assert Bundle(folder).names == ("b.csv", "a/imu.csv", "a/packed.csv")
     assert Bundle(folder).read("a/packed.csv") == b"packed"
     for bundle in (Bundle(folder), Bundle(archive)):
-        assert bundle.found(r"(\w+)\.csv")["imu"] == "a/imu.csv"
+        assert bundle.found(r"a/(\w+)\.csv")["imu"] == "a/imu.csv"
         assert bundle.read("a/imu.csv") == b"this is a/imu.csv"
+
+
+def test_files_of_several_recordings_are_not_mixed(tmp_path: Path) -> None:
+    bundle = Bundle(folder_with(tmp_path, "one/Gyroscope.csv", "two/Location.csv", "two/meta/time.csv"))
+    with pytest.raises(InputError, match="holds several recordings; expected one of one, two"):
+        bundle.found(r"(Gyroscope|Location)\.csv")
+    assert bundle.found(r"(?:meta/)?(Location|time)\.csv") == {
+        "Location": "two/Location.csv",
+        "time": "two/meta/time.csv",
+    }
 
 
 def test_of_pictures_not_all_names_are_taken(tmp_path: Path) -> None:

