@@ -55,7 +55,7 @@ def read(path: str | Path) -> Log:
         upright=True,
         axes={"imu": FORWARD_LEFT_UP},
         references=frozenset({"pose"}),
-        notes=(*notes, "pose: the solution of the OXTS itself; what its heights are above the files do not tell"),
+        notes=(*notes, "pose: the solution of the OXTS itself, no measurement"),
     )
 
 
@@ -122,6 +122,7 @@ def _pose(path: Path, time: Array, values: Array) -> Track:
         RowSource(f"{path}, pose"),
         time[kept],
         values[:, :3] * [DEG, DEG, 1.0],
+        datum_known=False,
         position_std=std if (std > 0.0).all() else None,
         velocity=np.column_stack([values[:, NORTH_EAST_VELOCITY], -values[:, UP_VELOCITY]]),
         velocity_std=velocity_std if (velocity_std > 0.0).all() else None,

@@ -381,6 +381,8 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float], base: L
         lines.append(_point_line("  antenna_position_m" if section == "gnss" else "  point_m", of))
     if section == "gnss" and track.position_std is None:
         lines.append(f"  position_std_m: [1.5, 1.5, 3.0]  {CHECK} north, east, down; the file has none")
+    if not track.datum_known:
+        lines.append(f"  height: ellipsoidal  {CHECK} the log does not tell what heights are above; else sea-level")
     if track.above_sea:
         lines.append(f"  height: as-given  {CHECK} above the sea; sea-level with geoid_height_m makes them ellipsoidal")
     return lines
