@@ -83,3 +83,8 @@ def test_a_dot_is_none(tmp_path: Path) -> None:
     path = tmp_path / "dot.csv"
     path.write_text("DeviceTag:,DOT1\n" + ",".join(NAMES) + "\n" + "1,2,0,0,9.8,1,1,1\n" * 3)
     assert data_format(path) == "xsens-dot"
+    path.write_text("DeviceTag:\tDOT1\n" + "\t".join(NAMES) + "\n" + "1\t2\t0\t0\t9.8\t1\t1\t1\n" * 3)
+    assert data_format(path) == "xsens-dot"
+    path.write_text("\t".join(NAMES) + "\n" + "".join(f"{k}\t{16667 * k}\t0\t0\t9.8\t1\t1\t1\n" for k in range(9)))
+    with pytest.raises(InputError, match=r"makes 0\.6 Hz; is it the export of a DOT"):
+        read(path)

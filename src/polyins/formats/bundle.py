@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import re
 import zlib
 from collections.abc import Iterator, Sequence
@@ -107,7 +108,8 @@ def _archive(path: Path) -> ZipFile:
 
 def _names(folder: Path, prefix: str, deep: int) -> Iterator[str]:
     try:
-        entries = sorted(folder.iterdir())
+        with os.scandir(folder) as listed:
+            entries = sorted(listed, key=lambda entry: entry.name)
     except OSError as error:
         raise InputError(f"{folder}: cannot be listed ({error.strerror})") from error
     files = [entry for entry in entries if entry.is_file()]
@@ -115,4 +117,4 @@ def _names(folder: Path, prefix: str, deep: int) -> Iterator[str]:
         yield prefix + entry.name.removesuffix(".gz")
     folders = [entry for entry in entries if entry.is_dir() and not entry.is_symlink()] if deep > 1 else []
     for entry in folders[:MOST_OF_A_FOLDER]:
-        yield from _names(entry, f"{prefix}{entry.name}/", deep - 1)
+        yield from _names(Path(entry), f"{prefix}{entry.name}/", deep - 1)

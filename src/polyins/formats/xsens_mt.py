@@ -30,6 +30,8 @@ VALUES = r"PacketCounter|SampleTimeFine|(Acc|Gyr)_[XYZ]|Quat_q[0-3]|Mat\[[12]\]\
 TICK_S = 1e-4
 TICK_RANGE, PACKET_RANGE = 2**32, 2**16
 RATE_AGREES = 0.05
+SLOWEST_S = 0.2
+"""between rows of a sensor whose rate the header does not tell"""
 EAST_NORTH = {
     "ENU": ((1.0, 0.0), (0.0, 1.0)),
     "NED": ((0.0, 1.0), (1.0, 0.0)),
@@ -41,8 +43,10 @@ EAST_NORTH = {
 def fits(head: bytes) -> bool:
     """Whether it has the header of MT Manager, and not that of a DOT."""
     lines = head.decode("utf-8-sig", errors="replace").splitlines()
-    header = next((line for line in lines if re.search(HEADER, line)), None)
-    return header is not None and (lines[0].startswith("//") or "\t" in header)
+    header = next((n for n, line in enumerate(lines) if re.search(HEADER, line)), None)
+    if header is None or any(line.startswith(("DeviceTag", "sep=")) for line in lines[:header]):
+        return False
+    return lines[0].startswith("//") or "\t" in lines[header]
 
 
 def read(path: str | Path) -> Log:
@@ -87,6 +91,11 @@ def _time(path: Path, rows: TextRows, rate_hz: float | None) -> tuple[Array, lis
             raise InputError(f"{path}: SampleTimeFine is missing in {np.sum(~np.isfinite(ticks))} row(s)")
         time = _unwrapped(ticks, TICK_RANGE) * TICK_S
         usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+        if not rate_hz and usual > SLOWEST_S:
+            raise InputError(
+                f"{path}: SampleTimeFine in 1e-4 s makes {1.0 / usual:.3g} Hz; is it the export of a DOT, with us and "
+                "deg/s?"
+            )
         if rate_hz and usual > 0.0 and abs(usual * rate_hz - 1.0) > RATE_AGREES:
             said = f"SampleTimeFine makes {1.0 / usual:.5g} Hz, the header says {rate_hz:g} Hz: is its unit not 1e-4 s?"
             return time, [said]
