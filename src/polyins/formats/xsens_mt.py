@@ -16,17 +16,18 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import RowSource, SensorRows
+from polyins.formats.rows import ImuRows, RowSource, SensorRows
 from polyins.formats.text_rows import TextRows, header_line, lines_before, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
-HEADER = r"(^|[\t,;])\"?Acc_X\"?[\t,;].*Gyr_X"
+HEADER = r"(^|[\t,;])\"?(Acc_X\"?[\t,;].*Gyr_X|VelInc_X\"?[\t,;].*OriInc_q?[w0]|OriInc_q?[w0]\"?[\t,;].*VelInc_X)"
+VELOCITIES = ("VelInc_X", "VelInc_Y", "VelInc_Z")
 RATES, FORCES = ("Gyr_X", "Gyr_Y", "Gyr_Z"), ("Acc_X", "Acc_Y", "Acc_Z")
 QUATERNION = ("Quat_q0", "Quat_q1", "Quat_q2", "Quat_q3")
 MATRIX = ("Mat[1][1]", "Mat[2][1]")
 """where the sensor's x axis points, in the frame of the orientation"""
-VALUES = r"PacketCounter|SampleTimeFine|(Acc|Gyr)_[XYZ]|Quat_q[0-3]|Mat\[[12]\]\[1\]|Yaw|Roll|Pitch"
+VALUES = r"PacketCounter|SampleTimeFine|(Acc|Gyr|VelInc)_[XYZ]|OriInc_([wxyz]|q[0-3])|Quat_q[0-3]|Mat\[[12]\]\[1\]|Yaw"
 TICK_S = 1e-4
 TICK_RANGE, PACKET_RANGE = 2**32, 2**16
 RATE_AGREES = 0.05
@@ -59,18 +60,32 @@ def read(path: str | Path) -> Log:
     *comments, names = lines_before(content, header)
     delimiter = next(mark for mark in "\t;," if mark in names)
     rows = read_rows(str(found), content, header, delimiter, wanted=VALUES)
-    if not rows.has(*RATES, *FORCES):
+    turns = [f"OriInc_{one}" for one in ("wxyz" if "OriInc_w" in rows.columns else ("q0", "q1", "q2", "q3"))]
+    whole = rows.has(*RATES, *FORCES)
+    if not whole and not rows.has(*turns, *VELOCITIES):
         raise InputError(f"{found}: no row has rates and accelerations; expected Acc_X, ... and Gyr_X, ...")
-    rows = rows.whole(*RATES, *FORCES)
+    rows = rows.whole(*RATES, *FORCES) if whole else rows.whole(*turns, *VELOCITIES)
     time, notes = _time(found, rows, _told(comments, r"Update Rate: *([\d.]+)"))
     headings, frame_note = _heading(found, rows, time, _frame(comments))
     return Log(
         "boot",
-        {"imu": rates_to_rows(found, "imu", time, rows.of(*RATES), rows.of(*FORCES))},
+        {
+            "imu": rates_to_rows(found, "imu", time, rows.of(*RATES), rows.of(*FORCES))
+            if whole
+            else ImuRows(RowSource(f"{found}, imu"), time, _rotation_vectors(rows.of(*turns)), rows.of(*VELOCITIES))
+        },
         {},
         headings,
         notes=(*rows.warnings, *notes, *frame_note),
     )
+
+
+def _rotation_vectors(quaternions: Array) -> Array:
+    """Return the turns, rad, shape (T, 3), of unit quaternions, scalar first."""
+    quaternions = quaternions * np.where(quaternions[:, :1] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(quaternions[:, 1:], axis=1)
+    angle = 2.0 * np.arctan2(sine, quaternions[:, 0])
+    return np.asarray(quaternions[:, 1:] * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None])
 
 
 def _told(comments: list[str], pattern: str) -> float | None:
