@@ -101,7 +101,8 @@ def propose(paths: Sequence[str | Path]) -> str:
         lines += ["", "heading:", *_heading_lines(heading)]
     for speed in speeds[:1]:
         lines += ["", "odometer:", *_odometer_lines(speed)]
-    given = _given_start(tracks[0], span) if only_solution and not headings else []
+    same_log = only_solution and tracks[0].log is not None and tracks[0].log is imus[0].log
+    given = _given_start(tracks[0], span) if same_log and not headings else []
     lines += ["", "start:", *(given or [_start_line(bool(tracks) and not only_solution, tracks, headings)])]
     return "\n".join(lines) + "\n"
 
@@ -193,7 +194,7 @@ def _given_start(of: LogSource, span: tuple[float, float]) -> list[str]:
     """Return the state that a log's reference has when the IMUs begin: without other aids nothing tells it better."""
     track = of.rows
     assert isinstance(track, Track)
-    if of.log is None or track.velocity is None or track.attitude is None or track.time[-1] < span[0]:
+    if track.velocity is None or track.attitude is None or track.time[-1] < span[0]:
         return []
     row = int(np.searchsorted(track.time, span[0]))
     roll, pitch, heading = (float(angle) for angle in np.round(track.attitude[row] / DEG, 6))
@@ -270,7 +271,7 @@ def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) 
     if imu.log is not None and imu.log.upright:
         own = imu.log.axes.get(imu.stream, SENSOR_AXES)
         return [f"    axes: [{', '.join(own)}]  # forward, right, down, as the format has them"]
-    if imu.log is not None and imu.stream in imu.log.points and imu.log.imus:
+    if imu.log is not None and (imu.log.axes or imu.stream in imu.log.points):
         axes = composed(_shared_axes(imu.log), imu.log.axes.get(imu.stream, SENSOR_AXES))
         return [
             f"    axes: [{', '.join(axes)}]  {CHECK} as the log has them to each other, turned upright; "
