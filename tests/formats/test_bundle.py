@@ -62,6 +62,10 @@ def test_an_archive_that_is_cut_off(tmp_path: Path) -> None:
     path.write_bytes(whole[:500])
     with pytest.raises(InputError, match="is no whole zip archive"):
         head(path, 10)
+    central = whole.index(b"PK\x01\x02")
+    path.write_bytes(whole[: central + 6] + b"\xcd" + whole[central + 7 :])  # a version that there is not
+    with pytest.raises(InputError, match="is no whole zip archive"):
+        head(path, 10)
     path.write_bytes(whole.replace(b"xxxx", b"xyxx", 1))
     with pytest.raises(InputError, match="cannot be unpacked"):
         Bundle(path).read("imu0/data.csv")

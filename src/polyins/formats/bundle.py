@@ -5,13 +5,12 @@ from __future__ import annotations
 import gzip
 import os
 import re
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes, read_head
@@ -72,7 +71,7 @@ class Bundle:
     def _unpacked(self, archive: ZipFile, name: str) -> bytes:
         try:
             content = archive.read(name)
-        except (BadZipFile, OSError, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
+        except Exception as error:  # damage makes it raise whatever it stumbles over
             raise InputError(f"{self.path}, {name}: cannot be unpacked ({error}); is it damaged?") from error
         if not content.strip():
             raise InputError(f"{self.path}, {name}: is empty; expected data")
@@ -102,7 +101,7 @@ def state(path: Path) -> tuple[int, int]:
 def _archive(path: Path) -> ZipFile:
     try:
         return ZipFile(path)
-    except (BadZipFile, OSError) as error:
+    except Exception as error:  # damage makes it raise whatever it stumbles over
         raise InputError(f"{path}: is no whole zip archive ({error}); is it cut off?") from error
 
 

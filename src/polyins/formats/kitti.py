@@ -21,6 +21,7 @@ from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
 VALUES = 30
+DATE = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d{1,9})?"
 NORTH_EAST_VELOCITY, UP_VELOCITY = slice(6, 8), 10
 FORCES, RATES = slice(11, 14), slice(17, 20)
 POSITION_STD, VELOCITY_STD = 23, 24
@@ -104,10 +105,13 @@ def _numbers(content: bytes) -> list[float]:
 
 
 def _stamp(path: Path, line: str, number: int) -> float:
+    place = f"{path}, timestamps.txt, line {number + 1}"
+    if not re.fullmatch(DATE, line.strip()):
+        raise InputError(f"{place}: {line.strip()!r}; expected a date like 2011-09-26 13:02:25.964389445")
     try:
         instant = np.datetime64(line.strip().replace(" ", "T"), "ns")
     except ValueError as error:
-        raise InputError(f"{path}, timestamps.txt, line {number + 1}: {line.strip()!r}; expected a date") from error
+        raise InputError(f"{place}: {error}; expected a date") from error
     return float(instant.astype(np.int64)) * 1e-9
 
 
