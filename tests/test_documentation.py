@@ -245,6 +245,53 @@ def test_tutorial_runs(desk: Path, data_folder_if_any: None, capsys: pytest.Capt
         pytest.skip(f"done but for {', '.join(left_out)} (set POLYINS_DATA)")
 
 
+def test_first_log_runs(desk: Path, data_folder_if_any: None) -> None:
+    """Each log becomes a result that is not refused, and the pair of files too."""
+    if not _at_hand("logs"):
+        pytest.skip("the logs are not at hand (set POLYINS_DATA)")
+    logs = Path(os.environ["POLYINS_DATA"]) / "logs"
+    for name, log in (
+        ("flight.ulg", "ulog/ekf_failure.ulg"),
+        ("copter.bin", "dataflash/log0036.bin"),
+        ("robot.bag", "rosbag/husky.bag"),
+    ):
+        (desk / name).symlink_to(logs / log)
+    write_pair(desk)
+    assert follow(REPOSITORY / "docs" / "first-log.md", desk) == []
+    for folder, heights in (("flight", "ellipsoidal"), ("copter", "sea-level"), ("robot", "ellipsoidal")):
+        summary = json.loads((desk / folder / "summary.json").read_text())
+        assert summary["heights"] == heights
+        assert summary["utc_of_zero_s"] is not None
+        assert (desk / folder / "report.html").is_file()
+    summary = json.loads((desk / "drive" / "summary.json").read_text())
+    assert summary["utc_of_zero_s"] == WEEK_2312_UNIX_S
+    assert summary["coverage"]["of_recording"] > 0.85  # all but the standing start
+
+
+WEEK_2312_UNIX_S = 1714262382.0
+"""at which this GPS week began"""
+
+
+def write_pair(folder: Path) -> None:
+    """Write an IMU as CSV and fixes as `.pos`, both in seconds of one GPS week."""
+    described = scenario.Scenario(duration_s=150, static_s=20, rate_hz=100, imus=scenario.Board(count=1), outages=())
+    recording, begin = pi.simulate(described), 375000.0
+    stream, fixes = recording.imus[0], recording.gnss
+    assert fixes is not None
+    _write_imu(folder / "imu.csv", stream, FORWARD_LEFT_UP, begin)
+    table = (folder / "imu.csv").read_text()
+    (folder / "imu.csv").write_text(table.replace("t,gx,gy,gz,ax,ay,az", "time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z"))
+    degrees = fixes.position * [180.0 / np.pi, 180.0 / np.pi, 1.0]
+    values = np.hstack(
+        [np.full((len(fixes.time), 1), 2312.0), fixes.time[:, None] + begin, degrees, fixes.position_std]
+    )
+    header = (
+        "% (lat/lon/height=WGS84/ellipsoidal,Q=1:fix)\n%  GPST latitude(deg) longitude(deg) height(m) Q ns sdn sde sdu"
+    )
+    form = "%4d %.3f %.9f %.9f %.4f 1 12 %.4f %.4f %.4f 0 0 0 0 0"
+    np.savetxt(folder / "rover.pos", values, fmt=form, header=header, comments="")
+
+
 def test_reference_runs(desk: Path) -> None:
     follow(REFERENCE, desk)
 
@@ -388,6 +435,13 @@ def test_every_kind_of_finding_is_listed() -> None:
     assert listed == kinds_of_findings() | {"data", "point"}
 
 
+def test_faults_are_named_by_kinds_that_exist() -> None:
+    from polyins.studies.robustness.case import PARTS
+
+    kinds = {kind for _, faults, _ in PARTS for fault in faults for kind in fault.kinds}
+    assert kinds <= kinds_of_findings()
+
+
 def test_every_target_and_method_is_listed() -> None:
     from polyins.model.methods import METHODS
     from polyins.studies.targets import known
@@ -396,6 +450,14 @@ def test_every_target_and_method_is_listed() -> None:
     assert all(f"`{method}`" in section("### polyins run") for method in METHODS)
     readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     assert all(f"| `{method}` |" in readme for method in METHODS)
+
+
+def test_every_format_of_export_is_listed() -> None:
+    from polyins.tools.export.writing import EXPORTS
+
+    text = section("### polyins export")
+    assert re.findall(r"^\| `([a-z]+)` \|", text, flags=re.M) == [one.name for one in EXPORTS]
+    assert re.findall(r"`(\w+)`", text[text.index("`--to`") :].partition("\n")[0]) == [one.name for one in EXPORTS]
 
 
 def test_every_public_name_is_listed() -> None:

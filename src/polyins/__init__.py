@@ -38,10 +38,13 @@ if TYPE_CHECKING:
     from polyins.reading.loading import load as load
     from polyins.simulation.run import simulate as simulate
     from polyins.tools.comparison import compare as compare
+    from polyins.tools.export.writing import ExportOptions as ExportOptions
+    from polyins.tools.export.writing import export as export
 
 _HOMES = {
     "AidingSensor": "model.rig",
     "AidingStream": "model.recording",
+    "ExportOptions": "tools.export.writing",
     "GnssStream": "model.recording",
     "Imu": "model.rig",
     "ImuStream": "model.recording",
@@ -57,6 +60,7 @@ _HOMES = {
     "compare": "tools.comparison",
     "datasets": "reading.datasets:",
     "evaluate": "evaluation.summary:summarize",
+    "export": "tools.export.writing",
     "find_start": "navigate.batch",
     "load": "reading.loading",
     "run": "navigate.batch",

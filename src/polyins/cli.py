@@ -546,11 +546,34 @@ def info(files: tuple[Path, ...], as_json: bool) -> None:
 @cli.command()
 @click.argument("source", metavar="IN", type=FILE)
 @click.argument("target", metavar="OUT", type=FILE)
-def convert(source: Path, target: Path) -> None:
-    """Convert a data file; the formats follow from content (IN) and suffix (OUT)."""
+@click.option("--stream", default=None, help="Of a log of several: the one that is written.")
+def convert(source: Path, target: Path, stream: str | None) -> None:
+    """Convert a data file; formats follow from content (IN) and suffix (OUT: of a log, a folder has none)."""
     from polyins.tools.convert import convert as convert_file
 
-    for text in convert_file(source, target):
+    for text in convert_file(source, target, stream):
+        say(f"warning: {text}")
+    say(f"written: {target}")
+
+
+@cli.command()
+@click.argument("solution", metavar="SOLUTION", type=FILE)
+@click.argument("target", metavar="OUT", type=FILE)
+@click.option("--to", required=True, help="tum, kitti, kml, geojson, gpx, nmea, mcap, pos or csv.")
+@click.option("--method", default=None, help="Which of the methods of a comparison, as enav-fusion or single/imu1.")
+@click.option("--rate", "rate_hz", type=RATE, default=None, help="Rows a second; all unless given.")
+@click.option("--columns", default=None, help="Of csv: names separated by commas; all unless given.")
+@click.option(
+    "--utc-of-zero", default=None, help="When time_s is zero, as 2024-05-01T12:00:00Z or 'week 2312' (of GPS)."
+)
+@click.option("--geoid-height", "geoid_height_m", type=float, default=None, help="Of the geoid above the ellipsoid, m.")
+def export(solution: Path, target: Path, to: str, method: str | None, columns: str | None, **options: Any) -> None:
+    """Write a solution, a run's folder or its solution.parquet, as a new file that other programs open."""
+    from polyins.tools.export.trace import read_trace
+    from polyins.tools.export.writing import ExportOptions, write
+
+    chosen = tuple(name.strip() for name in columns.split(",")) if columns is not None else ()
+    for text in write(read_trace(solution, method), target, to, ExportOptions(columns=chosen, **options)):
         say(f"warning: {text}")
     say(f"written: {target}")
 

@@ -106,10 +106,28 @@ def whole(path: str | Path) -> Iterator[Path]:
         beside.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Give the path of a new folder beside `path` that takes its name when the block ends without an error."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as around:
+        beside = Path(around) / path.name
+        beside.mkdir()
+        yield beside
+        beside.rename(path)
+
+
 def write_bytes(path: str | Path, content: bytes) -> None:
     """Write a file whole, packed if its name ends in `.gz`."""
     with whole(path) as beside:
         beside.write_bytes(gzip.compress(content, mtime=0) if Path(path).suffix == ".gz" else content)
+
+
+def new_file(path: str | Path) -> Path:
+    """Return the path of a file, or folder, that is to be made; raises InputError if there is one."""
+    if Path(path).exists():
+        raise InputError(f"{path}: exists; expected the name of a new one")
+    return Path(path)
 
 
 def plain_suffix(path: str | Path) -> str:

@@ -24,6 +24,8 @@ from written_recordings import (
 
 from polyins.config import parse
 from polyins.config.yaml_document import read_yaml
+from polyins.errors import InputError
+from polyins.formats import geoid
 from polyins.model.rig import DEG, HOUR
 from polyins.reading.imu_stream import mount_rotation
 from polyins.reading.loading import load
@@ -147,6 +149,32 @@ def test_listed_outages_come_out_in_order(tmp_path: Path) -> None:
 def test_sea_level_heights_are_raised_by_the_geoid(tmp_path: Path) -> None:
     recording = loaded(tmp_path, gnss={"height": "sea-level", "geoid_height_m": -13.5})
     np.testing.assert_allclose(recording.gnss.position[:, 2], 6.5)
+
+
+def test_sea_level_heights_are_raised_by_a_grid_if_there_is_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(geoid, "heights", lambda position: 40.0 + 0.1 * np.arange(len(position)))
+    recording = loaded(tmp_path, gnss={"height": "sea-level"})
+    np.testing.assert_allclose(recording.gnss.position[:, 2], 60.0 + 0.1 * np.arange(10))
+    assert recording.heights == "ellipsoidal"
+    assert any("brought above the ellipsoid by EGM96, 40.5 m there" in text for text in recording.warnings)
+    own = loaded(tmp_path, gnss={"height": "sea-level", "geoid_height_m": -13.5})
+    np.testing.assert_allclose(own.gnss.position[:, 2], 6.5)
+    assert not any("EGM96" in text for text in own.warnings)
+
+
+def test_heights_that_stay_as_they_are_are_not_compared_with_others(tmp_path: Path) -> None:
+    recording = loaded(tmp_path, gnss={"height": "as-given"})
+    assert recording.heights == "unknown"
+    assert any("above what those of the file are above" in text for text in recording.warnings)
+    values = write_recording(tmp_path)
+    values["reference"] = {"file": "gnss.txt"}
+    values["gnss"]["height"] = "as-given"
+    with pytest.raises(InputError, match="as-given for one of gnss and reference"):
+        load(write_config(tmp_path, values))
+    values["reference"]["height"] = "as-given"
+    assert load(write_config(tmp_path, values)).heights == "unknown"
 
 
 def test_a_given_std_takes_the_place_of_the_file(tmp_path: Path) -> None:

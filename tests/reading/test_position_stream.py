@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,3 +45,10 @@ def test_what_is_no_reference(tmp_path: Path) -> None:
         load_reference(gnss, solution(begin=900.0))
     with pytest.raises(InputError, match="has no reference; expected that section"):
         load_reference(write_config(tmp_path, write_recording(tmp_path)), solution())
+
+
+def test_heights_above_another_zero_do_not_judge(tmp_path: Path) -> None:
+    gnss = write_rows(tmp_path / "gnss.txt", fixes())
+    with pytest.raises(InputError, match="ellipsoidal, those of the solution sea-level; expected both alike"):
+        load_reference(gnss, replace(solution(), heights="sea-level"))
+    assert load_reference(gnss, replace(solution(), heights="unknown")).heights == "ellipsoidal"

@@ -23,10 +23,16 @@ from written_recordings import (
 )
 
 from polyins.errors import InputError
+from polyins.formats import geoid
 from polyins.reading.loading import load
 
 Values = dict[str, Any]
 Spoil = Callable[[Path, Values], None]
+
+
+@pytest.fixture(autouse=True)
+def _no_grid_of_the_geoid(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(geoid, "library", lambda: None)
 
 
 def setting(*keys: str | int, to: Any) -> Spoil:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from polyins import cli
 from polyins.errors import InputError
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, read_log
-from polyins.formats.rows import Track, intervals
+from polyins.formats.rows import ImuRows, Track, intervals
 from polyins.formats.rtklib import read_gnss
 from polyins.model.axes import axes_matrix
 from polyins.model.geodesy import displacement
@@ -78,7 +79,7 @@ def check_imus(log: Log, wanted: dict[str, Any]) -> None:
 
 def check_tracks(log: Log, wanted: dict[str, Any]) -> None:
     receivers = {name: facts for name, facts in wanted.items() if "rows_3d_fix" in facts}
-    assert set(log.tracks) == set(receivers)
+    assert {name for name in log.tracks if log.tracks[name].quality} == set(receivers)
     for name, facts in receivers.items():
         track = log.tracks[name]
         assert sum(track.quality.values()) == facts["rows"]
@@ -95,13 +96,15 @@ def check_tracks(log: Log, wanted: dict[str, Any]) -> None:
 def check_sensors(log: Log, wanted: dict[str, Any]) -> None:
     for section, (kind, place) in SENSORS.items():
         known = {name: rows for name, rows in log.sensors.items() if rows.kind == kind}
+        assert len(known) == len(wanted.get(section, {}))
         for name, rows in known.items():
-            facts = wanted[section][name]
+            facts = wanted[section][name.removesuffix(" orientation")]
             assert len(rows.time) == facts["rows"]
             scale = 1.0 / DEG if kind == "heading" else 1.0
             for row, sample in facts["sample"].items():
                 assert rows.time[int(row)] == pytest.approx(sample[0], abs=1e-6)
-                off = rows.value[int(row)] * scale - sample[place]
+                angle = 90.0 - sample[place] if "ENU" in facts["columns"] else sample[place]
+                off = rows.value[int(row)] * scale - angle
                 assert (off + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-4)
 
 
@@ -111,6 +114,22 @@ def test_streams_are_what_the_own_library_reads(name: str, logs: Path, expected:
     check_imus(log, wanted["imu"])
     check_tracks(log, wanted["gnss"])
     check_sensors(log, wanted)
+    check_estimates(log, wanted.get("position", {}))
+
+
+def check_estimates(log: Log, wanted: dict[str, Any]) -> None:
+    """What autopilots estimate themselves is there, though it is not navigated with."""
+    for name, facts in wanted.items():
+        track = log.tracks[name]
+        assert name in log.unusable
+        assert len(track.time) == facts["rows"]
+        place = 7 if "roll" in facts["columns"] else 1
+        for row, sample in facts["sample"].items():
+            at = int(row)
+            assert track.time[at] == pytest.approx(sample[0], abs=1e-6)
+            np.testing.assert_allclose(track.position[at] * [1, 1, -1], sample[place : place + 3], atol=1e-6)
+            assert track.velocity is not None
+            np.testing.assert_allclose(track.velocity[at], sample[4:7], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", LOGS)
@@ -314,9 +333,10 @@ def test_ecef_and_degrees_of_one_drive(logs: Path) -> None:
 @pytest.mark.parametrize("name", ["neo-m8l", "neo-m8u", "zed-f9p-hp", "zed-f9r"])
 def test_positions_of_ublox(name: str, logs: Path, expected: dict[str, Any]) -> None:
     log, wanted = read_log(logs / "ubx" / f"{name}.ubx"), expected[f"ubx/{name}.ubx"]["gnss"]
-    assert set(log.tracks) == {kind for kind in wanted if kind.startswith("NAV")}
-    for kind, track in log.tracks.items():
-        facts = wanted[kind]
+    rapid = {"HNR-PVT"} & set(log.tracks)
+    assert set(log.tracks) - rapid == set(wanted)
+    for kind in (one for one in wanted if one.startswith("NAV")):
+        track, facts = log.tracks[kind], wanted[kind]
         assert len(track.time) == facts["rows_3d_fix"]
         assert (track.time[0], track.time[-1]) == (facts["first_s"], facts["last_s"])
         for row, sample in facts["sample"].items():
@@ -330,6 +350,40 @@ def test_positions_of_ublox(name: str, logs: Path, expected: dict[str, Any]) -> 
     assert log.utc_of_zero is not None
     utc = np.datetime64(row[-1].split()[0]).astype("datetime64[s]").astype(float)
     assert log.utc_of_zero + coarse.time[0] == pytest.approx(utc, abs=0.51)
+
+
+@pytest.mark.parametrize("name", ["neo-m8l", "neo-m8u"])
+def test_sensors_of_ublox(name: str, logs: Path, expected: dict[str, Any]) -> None:
+    log, wanted = read_log(logs / "ubx" / f"{name}.ubx"), expected[f"ubx/{name}.ubx"]
+    meas, offset = log.imus["ESF-MEAS"], log.clock_offsets["ESF-MEAS"]
+    steps = intervals(meas.time)[:, None]
+    gyro, force = (wanted["imu"][f"ESF-MEAS {one}"] for one in ("gyro", "accel"))
+    assert len(meas.time) == gyro["rows"] == force["rows"]
+    assert 1.0 / np.median(np.diff(meas.time)) == pytest.approx(gyro["median_rate_hz"], rel=1e-6)
+    agree_with_samples(meas.time - offset, meas.dtheta / steps, gyro["sample"], 1e-8)
+    np.testing.assert_allclose((meas.dvel / steps).mean(axis=0), force["mean"], atol=0.03)  # at the gyro's stamps
+    if "ESF-RAW" in wanted["imu"]:
+        check_imus(replace(log, imus={"ESF-RAW": moved_back(log, "ESF-RAW")}), {"ESF-RAW": wanted["imu"]["ESF-RAW"]})
+    for row, sample in wanted.get("wheel", {}).get("ESF-MEAS", {}).get("sample", {}).items():
+        ticks = log.sensors["ESF-MEAS single tick"]
+        assert ticks.time[int(row)] - offset == pytest.approx(sample[0], abs=1e-6)
+        assert ticks.value[int(row)] == sample[2]
+    if "attitude" in wanted:
+        facts, shown = wanted["attitude"]["HNR-ATT"], log.sensors["HNR-ATT"]
+        assert len(shown.time) == facts["rows"]
+        for row, sample in facts["sample"].items():
+            assert shown.time[int(row)] == pytest.approx(sample[0])
+            assert shown.value[int(row)] / DEG == pytest.approx(sample[3])
+            assert shown.std is not None
+            assert shown.std[int(row)] / DEG == pytest.approx(sample[6])
+        facts, track = wanted["position"]["HNR-PVT"], log.tracks["HNR-PVT"]
+        assert len(track.time) == facts["rows"]
+        for row, sample in facts["sample"].items():
+            np.testing.assert_allclose(track.position[int(row)] / [DEG, DEG, 1.0], sample[1:4], atol=1e-9)
+
+
+def moved_back(log: Log, name: str) -> ImuRows:
+    return replace(log.imus[name], time=log.imus[name].time - log.clock_offsets[name])
 
 
 def test_a_receiver_alone_is_no_recording(logs: Path) -> None:
@@ -385,3 +439,23 @@ def test_positions_of_nmea(name: str, day: str, logs: Path, expected: dict[str, 
         np.testing.assert_array_equal(track.position_std[30], wanted["GST"]["sample"]["30"][1:])
     else:
         assert track.position_std is None
+
+
+def test_speeds_and_headings_of_nmea(logs: Path, expected: dict[str, Any]) -> None:
+    log, wanted = read_log(logs / "nmea" / "boat.nmea"), expected["nmea/boat.nmea"]
+    midnight = np.datetime64("2018-08-20", "s").astype(float)
+    magnetic, facts = log.sensors["HDG"], wanted["heading"]["HDG"]
+    assert len(magnetic.time) == facts["rows"]
+    assert (np.diff(magnetic.time) > 0.0).all()
+    for row, (heading, variation, _) in facts["sample"].items():
+        assert magnetic.value[int(row)] / DEG == pytest.approx(heading + variation)
+    speed, facts = log.sensors["RMC"], wanted["gnss"]["RMC"]
+    assert len(speed.time) == facts["rows"] - facts["stamps_not_rising"]
+    assert (speed.time[0] - midnight, speed.time[-1] - midnight) == (facts["first_s"], facts["last_s"])
+    np.testing.assert_allclose(speed.value[0], facts["sample"]["0"][3])
+    water, facts = log.sensors["VHW"], wanted["speed"]["VHW"]
+    assert len(water.time) == facts["rows"]
+    for row, sample in facts["sample"].items():
+        assert water.value[int(row)] == pytest.approx(sample[2] * 1852 / 3600)
+    assert "through water" in log.unusable["VHW"]
+    assert "no sentence (GST) tells how good" in log.notes[0]

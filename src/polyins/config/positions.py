@@ -45,7 +45,7 @@ class GnssEntry(Section):
     height: Literal["ellipsoidal", "sea-level", "as-given"] = "ellipsoidal"
     """what heights count from; as-given: whatever it is, and so do those of the solution"""
     geoid_height_m: Number | None = None
-    """height of the geoid above the ellipsoid, m; needed with sea-level heights"""
+    """height of the geoid above the ellipsoid, m; of sea-level heights, which without it take that of a grid"""
     plane_origin: GeodeticPoint | None = None
     """turn latitude and longitude into metres on the local plane that touches here"""
 
@@ -70,4 +70,4 @@ class ReferenceEntry(Section):
     height: Literal["ellipsoidal", "sea-level", "as-given"] = "ellipsoidal"
     """what heights count from; as-given: whatever it is, and so do those of the solution"""
     geoid_height_m: Number | None = None
-    """height of the geoid above the ellipsoid, m; needed with sea-level heights"""
+    """height of the geoid above the ellipsoid, m; of sea-level heights, which without it take that of a grid"""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NotRequired, TypedDict
 
 from polyins.model.findings import Level, Severity
+from polyins.model.recording import Heights
 
 
 class ErrorFigures(TypedDict):
@@ -140,6 +141,10 @@ class RunDocument(MethodDocument):
     start: dict[str, object]
     verdict: VerdictDocument
     coverage: CoverageFigures
+    heights: Heights | None
+    """what they count from; None: positions are on a local plane"""
+    utc_of_zero_s: float | None
+    """Unix time at which the clock shows zero"""
     exclusions: list[dict[str, object]]
     faults: list[str]
     mounting: dict[str, MountingEstimate]

@@ -78,6 +78,8 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
         "start": solution.start,
         "verdict": judged.document(),
         "coverage": coverage(solution.recording_span, figures.epochs),
+        "heights": solution.heights if solution.geodetic else None,
+        "utc_of_zero_s": solution.utc_of_zero,
         "exclusions": [
             {"imu": one.stream, "from_s": one.from_s, "to_s": one.to_s, "cause": one.text, "statistic": None}
             for one in judged.findings

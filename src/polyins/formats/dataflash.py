@@ -2,7 +2,8 @@
 
 `TimeUS` counts microseconds since boot, axes are forward, right, down; rates and forces are instants of the filtered
 sensors. IMU instances are messages IMU, IMU2, IMU3 up to 4.0, afterwards messages IMU with a number `I`; those of
-batches (ISBH, ISBD) are left aside. `Alt` of GPS is above the sea. Fixes are stamped as they arrive.
+batches (ISBH, ISBD) are left aside. `Alt` of GPS is above the sea; `Und` of GPA, in new logs, is the height of
+that less the height above the ellipsoid. Fixes are stamped as they arrive.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
 IMU_MESSAGES = ("IMU", "IMU2", "IMU3")
-KINDS = (*IMU_MESSAGES, "GPS", "GPS2", "GPA", "GPA2", "ATT", "PARM")
+FILTERS = ("NKF1", "NKF6", "XKF1", "XKF6")
+"""messages of the autopilot's own filters: EKF2 and EKF3, first and second core, or with a number `C`"""
+KINDS = (*IMU_MESSAGES, "GPS", "GPS2", "GPA", "GPA2", "ATT", "PARM", *FILTERS)
 THREE_DIMENSIONS = 3
 FIXES = {0: "none", 1: "none", 2: "2D", 3: "3D", 4: "DGPS", 5: "float", 6: "fix"}
 
@@ -35,13 +38,14 @@ def read(path: str | Path) -> Log:
     with damage_named(found, "ArduPilot DataFlash"):
         tables, parameters = _tables(library.DFReader_binary(str(found)))
         imus = _imus(found, tables)
-        tracks = _tracks(found, tables)
+        tracks, estimates = _tracks(found, tables), _estimates(found, tables)
         return Log(
             "boot",
             imus,
-            tracks,
+            tracks | estimates,
             _headings(found, tables),
-            dict.fromkeys(list(tracks)[1:], "only one receiver can aid the filter"),
+            dict.fromkeys(list(tracks)[1:], "only one receiver can aid the filter")
+            | dict.fromkeys(estimates, "ArduPilot's own estimate, on a plane"),
             utc_of_zero=_utc_of_zero(tables),
             upright=True,
             fix_age=parameters["GPS_DELAY_MS"] * 1e-3 if parameters.get("GPS_DELAY_MS") else None,
@@ -58,7 +62,7 @@ def _tables(reader: Any) -> tuple[dict[str, Table], dict[str, float]]:
         if kind == "PARM":
             parameters[values["Name"]] = float(values["Value"])
         elif "TimeUS" in values:
-            rows[_name(kind, values.get("I"))].append(values)
+            rows[_name(kind, values.get("C" if kind in FILTERS else "I"))].append(values)
     tables = {}
     for name, found in rows.items():
         numeric = [key for key, value in found[0].items() if isinstance(value, int | float)]
@@ -99,11 +103,14 @@ def _track(path: Path, name: str, fixes: Table, accuracies: Table | None) -> Tra
     std, velocity_std = _accuracies(fixes["TimeUS"], accuracies)
     if std is not None:
         kept = kept[(std[kept] > 0.0).all(axis=1)]
+    lowered = _at_fixes(fixes["TimeUS"], accuracies, "Und")[kept]
+    known = bool(len(kept)) and bool(np.isfinite(lowered).all())
+    height = fixes["Alt"][kept] - (lowered if known else 0.0)
     return Track(
         RowSource(f"{path}, {name}"),
         time[kept],
-        np.column_stack([fixes["Lat"] * DEG, fixes["Lng"] * DEG, fixes["Alt"]])[kept],
-        above_sea=True,
+        np.column_stack([fixes["Lat"][kept] * DEG, fixes["Lng"][kept] * DEG, height]),
+        above_sea=not known,
         position_std=None if std is None else std[kept],
         velocity=None if velocity_std is None else velocity[kept],
         velocity_std=None if velocity_std is None else velocity_std[kept],
@@ -115,11 +122,37 @@ def _accuracies(stamps: Array, table: Table | None) -> tuple[Array | None, Array
     """Return the std of position and velocity at each fix, shape (M, 3), of the same stamp or the last before."""
     if table is None or "HAcc" not in table:
         return None, None
+    horizontal, vertical, speed = (_at_fixes(stamps, table, key) for key in ("HAcc", "VAcc", "SAcc"))
+    position = np.nan_to_num(np.column_stack([horizontal, horizontal, vertical]))
+    velocity = np.repeat(np.nan_to_num(speed)[:, None], 3, axis=1)
+    return position, velocity if (speed[np.isfinite(speed)] > 0.0).all() else None
+
+
+def _at_fixes(stamps: Array, table: Table | None, key: str) -> Array:
+    """Return what was logged with each fix, shape (M,), or NaN: of the same stamp or the last before."""
+    if table is None or key not in table:
+        return np.full(len(stamps), np.nan)
     last = np.searchsorted(table["TimeUS"], stamps, "right") - 1
-    horizontal, vertical, speed = (np.where(last >= 0, table[key][last], 0.0) for key in ("HAcc", "VAcc", "SAcc"))
-    position = np.column_stack([horizontal, horizontal, vertical])
-    velocity = np.repeat(speed[:, None], 3, axis=1)
-    return position, velocity if (speed[last >= 0] > 0.0).all() else None
+    return np.where(last >= 0, table[key][last], np.nan)
+
+
+def _estimates(path: Path, tables: dict[str, Table]) -> dict[str, Track]:
+    """Return what the autopilot's own filters say: north, east and height on their plane, m, with the attitude."""
+    found = {}
+    for name in sorted(tables):
+        table = tables[name]
+        if not name.startswith(FILTERS) or not {"PN", "PE", "PD", "Roll", "Pitch", "Yaw"} <= set(table):
+            continue
+        time = table["TimeUS"] * 1e-6
+        kept = rising(time)
+        place, speed, angles = (
+            np.column_stack([table[one] for one in names])[kept]
+            for names in (("PN", "PE", "PD"), ("VN", "VE", "VD"), ("Roll", "Pitch", "Yaw"))
+        )
+        attitude = (angles * DEG + np.pi) % (2.0 * np.pi) - np.pi
+        position, source = place * [1.0, 1.0, -1.0], RowSource(f"{path}, {name}")
+        found[name] = Track(source, time[kept], position, geodetic=False, velocity=speed, attitude=attitude)
+    return found
 
 
 def _headings(path: Path, tables: dict[str, Table]) -> dict[str, SensorRows]:

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from polyins.formats.rtklib import GPS_EPOCH, LEAP_DAYS, WEEK_S
 from polyins.model.recording import Array
+
+WEEK_S = 604800.0
+GPS_EPOCH = np.datetime64("1980-01-06T00:00:00", "s")
+LEAP_DAYS = np.array(
+    ["1981-07-01", "1982-07-01", "1983-07-01", "1985-07-01", "1988-01-01", "1990-01-01", "1991-01-01", "1992-07-01",
+     "1993-07-01", "1994-07-01", "1996-01-01", "1997-07-01", "1999-01-01", "2006-01-01", "2009-01-01", "2012-07-01",
+     "2015-07-01", "2017-01-01"],
+    dtype="datetime64[s]",
+)  # fmt: skip
+"""From each of these days on GPS time is one second more ahead of UTC (IERS Bulletin C)."""
 
 
 def utc_of_week(week: Array, second: Array) -> Array:
@@ -15,3 +24,8 @@ def utc_of_week(week: Array, second: Array) -> Array:
     leaps = np.arange(1, len(LEAP_DAYS) + 1)
     begins = LEAP_DAYS.astype(float) - epoch + leaps  # of each new difference, in GPS time
     return np.asarray(epoch + gps - np.searchsorted(begins, gps, side="right"))
+
+
+def leap_seconds(utc: Array) -> Array:
+    """Return by how much GPS time is ahead of UTC at Unix times, s."""
+    return np.searchsorted(LEAP_DAYS.astype(float), utc, side="right").astype(float)

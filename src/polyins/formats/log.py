@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -53,6 +53,18 @@ class Log:
     antenna: tuple[float, float, float] | None = None
     """from the IMUs: forward, right, down, m; None: the log does not tell"""
     notes: tuple[str, ...] = ()
+    clock_offsets: Mapping[str, float] = field(default_factory=dict)
+    """what was added to the stamps of streams whose sensor has a clock of its own, s"""
+
+    def moved(self, shift: float) -> Log:
+        """Return the log on a clock that shows so much more, s."""
+
+        def of(streams: Mapping[str, Any]) -> dict[str, Any]:
+            return {name: replace(rows, time=rows.time + shift) for name, rows in streams.items()}
+
+        zero = None if self.utc_of_zero is None else self.utc_of_zero - shift
+        streams = of(self.imus), of(self.tracks), of(self.sensors)
+        return replace(self, imus=streams[0], tracks=streams[1], sensors=streams[2], utc_of_zero=zero)
 
     @property
     def streams(self) -> dict[str, ImuRows | Track | SensorRows]:
@@ -60,13 +72,13 @@ class Log:
         return {**self.imus, **self.tracks, **self.sensors}
 
 
-def needed(module: str, extra: str, path: Path) -> Any:
-    """Import the library that a format is read with; raise InputError that says what to install without it."""
+def needed(module: str, extra: str, path: str | Path, use: str = "read") -> Any:
+    """Import the library that a format needs; raise InputError that says what to install without it."""
     try:
         return import_module(module)
     except ImportError:
         library = module.partition(".")[0]
-        raise InputError(f"{path}: is read with {library}; expected pip install 'polyins[{extra}]'") from None
+        raise InputError(f"{path}: is {use} with {library}; expected pip install 'polyins[{extra}]'") from None
 
 
 @contextmanager
@@ -86,6 +98,19 @@ def rates_to_rows(path: Path, name: str, time: Array, gyro: Array, force: Array)
     steps = intervals(time)[:, None]
     source = RowSource(f"{path}, {name}")
     return ImuRows(source, time, gyro * steps, force * steps, gyro_unit="rad/s", accel_unit="m/s^2")
+
+
+def joined_rates(path: Path, name: str, gyro: Array, force: Array) -> ImuRows:
+    """Return rows at the gyro's stamps, where the accelerometer has one within an interval.
+
+    `gyro`: s, and rad/s, shape (T, 4); `force`: s, and m/s^2, shape (K, 4); stamps rise.
+    """
+    interval = float(np.median(np.diff(gyro[:, 0]))) if len(gyro) > 1 else 0.0
+    later = np.clip(np.searchsorted(force[:, 0], gyro[:, 0]), 1, len(force) - 1)
+    away = np.minimum(np.abs(force[later, 0] - gyro[:, 0]), np.abs(force[later - 1, 0] - gyro[:, 0]))
+    kept = gyro[away <= interval]
+    forces = np.column_stack([np.interp(kept[:, 0], force[:, 0], axis) for axis in force[:, 1:].T])
+    return rates_to_rows(path, name, kept[:, 0], kept[:, 1:], forces)
 
 
 def counted(kinds: Iterable[Any], name_of: Callable[[Any], str]) -> dict[str, int]:

@@ -13,10 +13,9 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
-from polyins.formats.gps_time import utc_of_week
+from polyins.formats.gps_time import WEEK_S, utc_of_week
 from polyins.formats.log import Log, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, Track
-from polyins.formats.rtklib import WEEK_S
 from polyins.formats.text_rows import TextRows, header_line, lines_before, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG, STANDARD_GRAVITY

@@ -20,7 +20,11 @@ from polyins.model.attitude import euler_angles
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
-TOPICS = ("sensor_combined", "vehicle_imu", "vehicle_gps_position", "sensor_gps", "vehicle_attitude")
+RECEIVERS = ("vehicle_gps_position", "sensor_gps")
+ATTITUDES = ("vehicle_attitude", "vehicle_attitude_groundtruth")
+PLACES = ("vehicle_local_position", "vehicle_local_position_groundtruth")
+TRUE_PLACE = "vehicle_global_position_groundtruth"
+TOPICS = ("sensor_combined", "vehicle_imu", *RECEIVERS, *ATTITUDES, *PLACES, TRUE_PLACE)
 WHOLE = 0.9
 """of the time that increments must cover for a stream to show the motion"""
 THREE_DIMENSIONS = 3
@@ -41,13 +45,17 @@ def read(path: str | Path) -> Log:
         topics = {name: {one.multi_id: one.data for one in log.data_list if one.name == name} for name in TOPICS}
         imus, unusable = _imus(found, topics)
         tracks = _tracks(found, topics)
+        places, headings = _places(found, topics), _headings(found, topics)
+        unusable |= dict.fromkeys(list(tracks)[1:], f"{next(iter(tracks), '')} is the receiver that PX4 used")
+        unusable |= {name: "PX4's own estimate, on a plane" for name in places if TRUE_PLACE not in name}
+        unusable |= dict.fromkeys((name for name in headings if "truth" in name), "the truth of a simulation")
         known = log.initial_parameters
         return Log(
             "boot",
             imus,
-            tracks,
-            _headings(found, topics["vehicle_attitude"]),
-            unusable | dict.fromkeys(list(tracks)[1:], "the same receiver at a lower rate"),
+            tracks | places,
+            headings,
+            unusable,
             utc_of_zero=_utc_of_zero(topics),
             upright=True,
             fix_age=known["EKF2_GPS_DELAY"] * 1e-3 if "EKF2_GPS_DELAY" in known else None,
@@ -94,11 +102,7 @@ def _increments(path: Path, name: str, topic: Topic) -> tuple[ImuRows, float]:
 
 
 def _tracks(path: Path, topics: dict[str, dict[int, Topic]]) -> dict[str, Track]:
-    named = [
-        (f"{kind}[{number}]", topic)
-        for kind in ("vehicle_gps_position", "sensor_gps")
-        for number, topic in sorted(topics[kind].items())
-    ]
+    named = [(f"{kind}[{number}]", topic) for kind in RECEIVERS for number, topic in sorted(topics[kind].items())]
     return {name: _track(path, name, topic) for name, topic in named if (topic["fix_type"] >= THREE_DIMENSIONS).any()}
 
 
@@ -127,20 +131,51 @@ def _track(path: Path, name: str, topic: Topic) -> Track:
     )
 
 
-def _headings(path: Path, attitudes: dict[int, Topic]) -> dict[str, SensorRows]:
-    """Return the heading of PX4's own filter."""
+def _places(path: Path, topics: dict[str, dict[int, Topic]]) -> dict[str, Track]:
+    """Return the positions of PX4's own filter on its plane, and what a simulation knows, with the attitude."""
     found = {}
-    for number, topic in sorted(attitudes.items()):
-        name = f"vehicle_attitude[{number}]"
-        turned = np.column_stack([topic[f"q[{k}]"] for k in range(4)]).astype(float)
-        heading = np.asarray(euler_angles(turned))[:, 2]
-        found[name] = SensorRows(RowSource(f"{path}, {name}"), "heading", topic["timestamp"] * 1e-6, heading)
+    for kind in PLACES:
+        for number, topic in sorted(topics[kind].items()):
+            name = f"{kind}[{number}]"
+            place, velocity = (np.column_stack([topic[v + axis] for axis in "xyz"]).astype(float) for v in ("", "v"))
+            time = topic["timestamp"] * 1e-6
+            kept = rising(time)
+            source = RowSource(f"{path}, {name}")
+            position = place[kept] * [1.0, 1.0, -1.0]
+            found[name] = Track(source, time[kept], position, geodetic=False, velocity=velocity[kept])
+    truth, turned = topics[TRUE_PLACE].get(0), topics[ATTITUDES[1]].get(0)
+    if truth is not None and turned is not None and "alt_ellipsoid" in truth:
+        time, angles = truth["timestamp"] * 1e-6, np.unwrap(_angles(turned), axis=0)
+        own = turned["timestamp"] * 1e-6
+        kept = rising(time)
+        kept = kept[(time[kept] >= own[0]) & (time[kept] <= own[-1])]
+        attitude = np.column_stack([np.interp(time[kept], own, angle) for angle in angles.T])
+        attitude = (attitude + np.pi) % (2.0 * np.pi) - np.pi
+        position = np.column_stack([truth["lat"] * DEG, truth["lon"] * DEG, truth["alt_ellipsoid"]]).astype(float)
+        name = f"{TRUE_PLACE}[0]"
+        found[name] = Track(RowSource(f"{path}, {name}"), time[kept], position[kept], attitude=attitude)
+    return found
+
+
+def _angles(topic: Topic) -> Array:
+    """Return roll, pitch, heading, rad, shape (T, 3)."""
+    return np.asarray(euler_angles(np.column_stack([topic[f"q[{k}]"] for k in range(4)]).astype(float)))
+
+
+def _headings(path: Path, topics: dict[str, dict[int, Topic]]) -> dict[str, SensorRows]:
+    """Return the heading of PX4's own filter, and that of a simulation."""
+    found = {}
+    for kind in ATTITUDES:
+        for number, topic in sorted(topics[kind].items()):
+            name = f"{kind}[{number}]"
+            heading = _angles(topic)[:, 2]
+            found[name] = SensorRows(RowSource(f"{path}, {name}"), "heading", topic["timestamp"] * 1e-6, heading)
     return found
 
 
 def _utc_of_zero(topics: dict[str, dict[int, Topic]]) -> float | None:
     """Return Unix time less time since boot, the most there is: a fix is stamped late, never early."""
-    for topic in topics["vehicle_gps_position"].values():
+    for topic in (topic for kind in RECEIVERS for topic in topics[kind].values()):
         known = (topic["time_utc_usec"] > 0) & (topic["fix_type"] >= THREE_DIMENSIONS)
         if known.any():
             apart = topic["time_utc_usec"][known].astype(float) - topic["timestamp"][known].astype(float)

@@ -90,11 +90,11 @@ class SensorRows:
 
     source: RowSource
     kind: str
-    """height, heading or odometer"""
+    """height, heading or odometer; speed: over ground, whichever way; ticks: of a wheel"""
     time: Array
     """s, shape (M,)"""
     value: Array
-    """height, m; heading, rad, clockwise from true north; forward speed, m/s; shape (M,)"""
+    """height, m; heading, rad, clockwise from true north; (forward) speed, m/s; ticks counted; shape (M,)"""
     std: Array | None = None
     """of the value, shape (M,)"""
 

@@ -15,25 +15,18 @@ from pathlib import Path
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.files import find, read_text
+from polyins.files import find, read_head, read_text
+from polyins.formats.gps_time import GPS_EPOCH, WEEK_S, leap_seconds, utc_of_week
 from polyins.formats.rows import RowSource, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
-WEEK_S = 604800.0
 JST_AHEAD_S = 9 * 3600.0
 """of UTC"""
-GPS_EPOCH = np.datetime64("1980-01-06T00:00:00", "s")
+HEAD_BYTES = 16384
 QUALITIES = {1: "fix", 2: "float", 3: "sbas", 4: "dgps", 5: "single", 6: "ppp"}
 ORDER = ("latitude", "longitude", "height", "q", "ns", "sdn", "sde", "sdu", "sdne", "sdeu", "sdun", "age", "ratio",
          "vn", "ve", "vu", "sdvn", "sdve", "sdvu")  # fmt: skip
-LEAP_DAYS = np.array(
-    ["1981-07-01", "1982-07-01", "1983-07-01", "1985-07-01", "1988-01-01", "1990-01-01", "1991-01-01", "1992-07-01",
-     "1993-07-01", "1994-07-01", "1996-01-01", "1997-07-01", "1999-01-01", "2006-01-01", "2009-01-01", "2012-07-01",
-     "2015-07-01", "2017-01-01"],
-    dtype="datetime64[s]",
-)  # fmt: skip
-"""From each of these days on GPS time is one second more ahead of UTC (IERS Bulletin C)."""
 
 
 def read_gnss(path: str | Path) -> Track:
@@ -51,7 +44,7 @@ def read_gnss(path: str | Path) -> Track:
         raise InputError(f"{found}: has a header and no rows; expected positions")
     dated = "/" in numbered[0][1]
     rows = _rows(found, numbered)
-    clock = next((name for name in ("UTC", "JST") if re.search(rf"%\s+{name}\s+(lat|x-ecef)", header)), "GPST")
+    clock = _clock(header)
     time = _seconds_from_date(rows[:, :6], clock) if dated else _seconds_from_week(rows[:, :2])
     values = rows[:, 6 if dated else 2 :]
     if "(d'" in header:
@@ -80,6 +73,26 @@ def read_gnss(path: str | Path) -> Track:
         quality=counts,
         warnings=_warnings(found, header, counts),
     )
+
+
+def utc_of_zero(path: str | Path) -> float | None:
+    """Return Unix time at the begin of the week that the stamps count from, s; None of a file that is not RTKLIB's."""
+    lines = read_head(path, HEAD_BYTES).decode("utf-8-sig", errors="replace").splitlines()
+    header = " ".join(line for line in lines if line.startswith("%"))
+    first = next((line for line in lines if line.strip() and not line.startswith("%")), "")
+    if not has_rows([first]) and not re.search("latitude|-ecef", header):
+        return None
+    begin = [float(text) for text in re.sub(r"[/:,]", " ", first).split()]
+    if "/" not in first:
+        week, second = begin[0], begin[1]
+    else:
+        week, second = divmod(float(_since_epoch(np.array([begin[:6]]), _clock(header))[0]), WEEK_S)
+    return float(utc_of_week(np.array([week]), np.array([second]))[0]) - second
+
+
+def _clock(header: str) -> str:
+    """Return GPST, UTC or JST, whichever the header names."""
+    return next((name for name in ("UTC", "JST") if re.search(rf"%\s+{name}\s+(lat|x-ecef)", header)), "GPST")
 
 
 def has_rows(lines: Sequence[str]) -> bool:
@@ -167,15 +180,19 @@ def _seconds_from_week(rows: Array) -> Array:
 
 
 def _seconds_from_date(rows: Array, clock: str) -> Array:
+    since = _since_epoch(rows, clock)
+    return np.asarray(since - np.floor(since[0] / WEEK_S) * WEEK_S)
+
+
+def _since_epoch(rows: Array, clock: str) -> Array:
+    """Return GPS seconds since the begin of GPS time of years, months, days, hours, minutes, seconds."""
     year, month, day = rows[:, :3].astype(int).T
     days = (year - 1970).astype("datetime64[Y]").astype("datetime64[M]") + (month - 1)
     midnight = (days.astype("datetime64[D]") + (day - 1)).astype("datetime64[s]")
     since = (midnight - GPS_EPOCH).astype(float) + rows[:, 3:] @ [3600.0, 60.0, 1.0]
     if clock == "JST":
         since = since - JST_AHEAD_S
-    if clock != "GPST":
-        since = since + np.searchsorted((LEAP_DAYS - GPS_EPOCH).astype(float), since, side="right")
-    return np.asarray(since - np.floor(since[0] / WEEK_S) * WEEK_S)
+    return np.asarray(since if clock == "GPST" else since + leap_seconds(since + GPS_EPOCH.astype(float)))
 
 
 def _listed(counts: dict[str, int]) -> str:

@@ -118,7 +118,7 @@ def read_solution(path: Path) -> Solution:
     Raises InputError if there is no such file or it lacks a column.
     """
     file = path / SOLUTION if path.is_dir() else path
-    columns, metadata = _read(file)
+    columns, metadata = read_table(file)
     time = _column(columns, "time_s", file)
     geodetic = not np.all(np.isnan(_column(columns, "latitude_deg", file)))
     names, error_time, errors = _read_imu_errors(file.with_name(IMU_ERRORS), tuple(metadata.get("imu_names", ())))
@@ -148,7 +148,23 @@ def read_solution(path: Path) -> Solution:
         status=_statuses(columns),
         recording_span=None if metadata.get("recording_span") is None else tuple(metadata["recording_span"]),
         findings=findings,
+        heights=metadata.get("heights", "unknown"),
+        utc_of_zero=metadata.get("utc_of_zero_s"),
     )
+
+
+def read_table(path: Path) -> tuple[pa.Table, dict[str, Any]]:
+    """Return the columns of a Parquet file and what polyins says of it; raises InputError if there is none."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; expected a Parquet file or a folder with {SOLUTION}")
+    try:
+        table, metadata = pq.read_table(path), pq.read_metadata(path).metadata
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"{path}: not readable as Parquet ({error})") from None
+    return table, json.loads((metadata or {}).get(METADATA, b"{}"))
 
 
 def trajectory_columns(of: Trajectory, origin: Array, geodetic: bool) -> dict[str, Array | None]:
@@ -215,6 +231,9 @@ def _metadata(solution: Solution, origin: Array) -> dict[str, object]:
         "first_call_s": solution.first_call_s,
         "recording_span": solution.recording_span,
         "findings": [finding.document() for finding in solution.findings],
+        "measurements": list(solution.measurements),
+        "heights": solution.heights,
+        "utc_of_zero_s": solution.utc_of_zero,
     }
 
 
@@ -264,19 +283,6 @@ def _arrow(name: str, values: Any, rows: int) -> pa.Array:
     return to_arrow(values if name in DOUBLES else np.asarray(values, dtype=np.float32))
 
 
-def _read(path: Path) -> tuple[pa.Table, dict[str, Any]]:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; expected a Parquet file or a folder with {SOLUTION}")
-    try:
-        table, metadata = pq.read_table(path), pq.read_metadata(path).metadata
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{path}: not readable as Parquet ({error})") from None
-    return table, json.loads((metadata or {}).get(METADATA, b"{}"))
-
-
 def _column(table: pa.Table, name: str, path: Path) -> Array:
     if name not in table.column_names:
         raise InputError(f"{path}: no column {name}; expected the columns of polyins's {path.name}")
@@ -305,7 +311,7 @@ def _statuses(table: pa.Table) -> NDArray[np.uint8] | None:
 def _read_imu_errors(path: Path, names: tuple[str, ...]) -> tuple[tuple[str, ...], Array, Array]:
     if not path.is_file():
         return names, np.zeros(0), np.zeros((0, len(names), 12))
-    table, _ = _read(path)
+    table, _ = read_table(path)
     time = _column(table, "time_s", path)
     present = tuple(dict.fromkeys(table.column("imu").to_pylist()))
     if not present or time.size % len(present):

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
-from polyins.formats.gps_time import utc_of_week
+from polyins.formats.gps_time import WEEK_S, utc_of_week
 from polyins.formats.log import Log, counted, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
-from polyins.formats.rtklib import WEEK_S
 from polyins.formats.text_rows import TextRows, header_line, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG

@@ -61,7 +61,7 @@ class Conversion:
 
     def _above_ellipsoid(self, fix: GnssFix) -> Array:
         assert self.gnss is not None
-        shift = height_shift(self.gnss, fix.geodetic, fix.above_sea)
+        shift = height_shift(self.gnss, fix.position, fix.geodetic, fix.above_sea)
         if shift is None:
             raise RefusedError("height above the sea without geoid_height_m")
         return np.asarray(fix.position + np.array([0.0, 0.0, shift]))

@@ -1,39 +1,52 @@
-"""NMEA 0183 sentences of a state: GGA, RMC, HDT, talker IN (integrated navigation)."""
+"""NMEA 0183 sentences of a state: GGA, RMC, HDT, GST, talker IN (integrated navigation)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from datetime import UTC, datetime
+from typing import Any
 
 from polyins.live.lines import checksum
-from polyins.live.snapshot import Snapshot
+from polyins.model.status import ATTITUDE_ONLY, NOT_TO_BE_USED, STATUSES
 
 UNIX_TIME = 1e9
 """Stamps above this are seconds of Unix time; below, only their time of day is known."""
 DAY = 86400.0
 KNOT = 1852.0 / 3600.0
-FIX, ESTIMATED = 1, 6
+INVALID, FIX, ESTIMATED = 0, 1, 6
 """GGA quality"""
+LOST = (STATUSES[ATTITUDE_ONLY], STATUSES[NOT_TO_BE_USED])
 
 
-def sentences(snapshot: Snapshot, geoid_height: float | None = None) -> list[str]:
-    """Return GGA, RMC and HDT with checksums and line ends.
+def sentences(row: Mapping[str, Any], geoid_height: float | None = None, *, above_sea: bool = False) -> list[str]:
+    """Return GGA, RMC and HDT with checksums and line ends of a `Snapshot.row`.
 
-    In dead reckoning GGA's quality is 6 and RMC's mode E, its status V. The height above the sea is empty unless the
-    height of the geoid above the ellipsoid, m, is known.
+    In dead reckoning GGA's quality is 6 and RMC's mode E, its status V; where the position is lost 0 and N. The height
+    above the sea is empty unless the height of the geoid above the ellipsoid, m, is known, or heights are `above_sea`.
     """
-    row = snapshot.row
-    time, date = _time_and_date(snapshot.state.time)
+    time, date = _time_and_date(row["time_s"])
     place = f"{_angle(row['latitude_deg'] or 0.0, 2, 'NS')},{_angle(row['longitude_deg'] or 0.0, 3, 'EW')}"
-    quality = ESTIMATED if snapshot.dead_reckoning else FIX
-    mode, status = ("E", "V") if snapshot.dead_reckoning else ("A", "A")
+    quality, mode, status = FIX, "A", "A"
+    if row["status"] in LOST:
+        quality, mode, status = INVALID, "N", "V"
+    elif row["dead_reckoning"]:
+        quality, mode, status = ESTIMATED, "E", "V"
     north, east = row["north_velocity_m_s"] or 0.0, row["east_velocity_m_s"] or 0.0
     speed, course = math.hypot(north, east) / KNOT, math.degrees(math.atan2(east, north)) % 360.0
+    height = _height(row["height_m"] or 0.0, geoid_height, above_sea)
     return [
-        sentence(f"INGGA,{time},{place},{quality},,,{_height(row['height_m'] or 0.0, geoid_height)},,"),
+        sentence(f"INGGA,{time},{place},{quality},,,{height},,"),
         sentence(f"INRMC,{time},{status},{place},{speed:.2f},{_turned(course)},{date},,,{mode}"),
         sentence(f"INHDT,{_turned(row['heading_deg'] or 0.0)},T"),
     ]
+
+
+def error_statistics(row: Mapping[str, Any]) -> str:
+    """Return GST: the standard deviations of latitude, longitude and height, m."""
+    time, _ = _time_and_date(row["time_s"])
+    std = ",".join(f"{row[f'std_{axis}_m']:.3f}" for axis in ("north", "east", "down"))
+    return sentence(f"INGST,{time},,,,,{std}")
 
 
 def sentence(body: str) -> str:
@@ -41,9 +54,11 @@ def sentence(body: str) -> str:
     return f"${body}*{checksum(body.encode()):02X}\r\n"
 
 
-def _height(height: float, geoid_height: float | None) -> str:
+def _height(height: float, geoid_height: float | None, above_sea: bool) -> str:
     """Return the height above the sea and that of the geoid, as far as they are known."""
-    return ",M,,M" if geoid_height is None else f"{height - geoid_height:.2f},M,{geoid_height:.2f},M"
+    if geoid_height is None:
+        return f"{height:.2f},M,,M" if above_sea else ",M,,M"
+    return f"{height if above_sea else height - geoid_height:.2f},M,{geoid_height:.2f},M"
 
 
 def _turned(angle: float) -> str:

@@ -98,7 +98,7 @@ class NmeaDatagrams:
 
     def take(self, snapshot: Snapshot) -> None:
         """Send the sentences; that nobody listens is no error."""
-        text = "".join(nmea.sentences(snapshot, self.geoid_height))
+        text = "".join(nmea.sentences(snapshot.row, self.geoid_height))
         try:
             self.socket.sendto(text.encode(), self.target)
         except OSError:
@@ -121,7 +121,7 @@ class NmeaServer:
 
     def take(self, snapshot: Snapshot) -> None:
         """Send the sentences to all."""
-        data = "".join(nmea.sentences(snapshot, self.geoid_height)).encode()
+        data = "".join(nmea.sentences(snapshot.row, self.geoid_height)).encode()
         for client in tuple(self.clients):
             try:
                 if client.send(data) == len(data):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from polyins.model.rig import DEG, Rig, Vector, zero_vector
 Array = NDArray[np.float64]
 Rows = slice | NDArray[np.bool_] | NDArray[np.intp]
 """which rows of a stream"""
+Heights = Literal["ellipsoidal", "sea-level", "unknown"]
 
 
 USUAL_OF = 10_000
@@ -105,6 +107,8 @@ class Reference:
     """roll, pitch, heading, rad, shape (R, 3)"""
     lever_arm: Vector = field(default_factory=zero_vector)
     """The reference's point in the array frame, m."""
+    heights: Heights = "ellipsoidal"
+    """what those of geodetic positions count from"""
 
     def between(self, first: int, last: int) -> Reference:
         """Return rows first ... last - 1."""
@@ -253,6 +257,10 @@ class Recording:
     """what was found where the configuration says `time_offset: estimate`"""
     aiding: tuple[AidingStream, ...] = ()
     """what sensors beside IMUs and GNSS say"""
+    heights: Heights = "ellipsoidal"
+    """what the heights of geodetic positions count from"""
+    utc_of_zero: float | None = None
+    """Unix time at which the common clock shows zero, s; None: no file tells it"""
 
     @property
     def sentences(self) -> tuple[str, ...]:

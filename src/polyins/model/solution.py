@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.model.findings import SILENT, Finding
+from polyins.model.recording import Heights
 from polyins.model.rig import Vector
 
 Array = NDArray[np.float64]
@@ -170,6 +171,10 @@ class Solution:
     """s, s: what the IMUs of the recording cover"""
     findings: tuple[Finding, ...] = ()
     """what there is to say of data and run"""
+    heights: Heights = "ellipsoidal"
+    """what the heights of geodetic positions count from"""
+    utc_of_zero: float | None = None
+    """Unix time at which `time` is zero, s; None: it is not known"""
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -31,6 +31,7 @@ from polyins.navigate.state import Further, Inputs, Navigators, Outputs, Plan, S
 from polyins.prepare import alignment, rigid, timesync, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.data_findings import of_data
+from polyins.prepare.radii import of_radii
 from polyins.prepare.timesync import Aligned
 
 Array = NDArray[np.float64]
@@ -137,7 +138,7 @@ def run(
 
     parts = restart.parts_of(recording, restart.pauses(of_them))
     whole = Solution.joined(list(restart.run_parts(parts, of_part, restart.rest_of)))
-    return replace(whole, recording_span=_span(of_them))
+    return replace(whole, recording_span=_span(of_them), findings=(*whole.findings, *of_radii(recording)))
 
 
 def known(run: Prepared, last: int, *, broken: bool = False) -> restart.Known:
@@ -398,6 +399,8 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         first_call_s=first_call_s,
         status=status_of(track, aided, recording.options.gnss_snap),
         recording_span=_span(recording),
+        heights=recording.heights,
+        utc_of_zero=recording.utc_of_zero,
         findings=(
             *notes(recording.warnings),
             *recording.findings,

@@ -7,8 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from polyins.config import Config, GnssEntry
+from polyins.config import Config, GnssEntry, ImuEntry
 from polyins.config.yaml_document import Document
+from polyins.formats import rtklib, table
+from polyins.formats.columns import is_parquet
+from polyins.formats.recognize import log_format, read_log
 from polyins.model.recording import ImuStream, Offset
 from polyins.model.rig import Imu
 from polyins.reading.position_stream import read_gnss
@@ -86,6 +89,33 @@ def _late(config: Config, document: Document, imus: Sequence[Imu], streams: Sequ
 def _gnss_offset(entry: GnssEntry, document: Document, imus: Sequence[Imu], streams: Sequence[ImuStream]) -> Offset:
     from polyins.calibration.offsets import gnss_offset
 
-    gnss, geodetic, _ = read_gnss(entry, document, ALWAYS)
+    fixes = read_gnss(entry, document, ALWAYS)
     with document.at(["gnss"]):
-        return gnss_offset(imus, streams, gnss, geodetic)
+        return gnss_offset(imus, streams, fixes.stream, fixes.geodetic)
+
+
+def utc_of_zero(config: Config) -> float | None:
+    """Return the Unix time at which the common clock shows zero, s, as the first file has it that tells it.
+
+    Clock offsets are those that are added to the stamps already.
+    """
+    entries: list[ImuEntry | GnssEntry] = [*config.imus]
+    if config.gnss is not None:
+        entries.append(config.gnss)
+    return next((utc for entry in entries if (utc := _utc_of_zero(entry)) is not None), None)
+
+
+def _utc_of_zero(entry: ImuEntry | GnssEntry) -> float | None:
+    if entry.time_offset == ESTIMATE or entry.columns is not None:
+        return None
+    if isinstance(entry, ImuEntry) and entry.rate_hz is not None:
+        return None  # rows are counted
+    if entry.format == "auto" and log_format(entry.file) is not None:
+        utc = read_log(entry.file).utc_of_zero
+    elif is_parquet(entry.file):
+        utc = table.utc_of_zero(entry.file)
+    elif isinstance(entry, GnssEntry) and entry.format in ("auto", "rtklib-pos"):
+        utc = rtklib.utc_of_zero(entry.file)
+    else:
+        utc = None
+    return None if utc is None else utc - entry.clock_offset_s

@@ -84,7 +84,7 @@ def _read_table(path: str | Path) -> tuple[Stream, tuple[str, ...]]:
     names = set(column_names(path))
     if names.issuperset(table.IMU_NAMES):
         return table.read_imu(path), ()
-    if "time_s" in names and (names.issuperset(table.GEODETIC_NAMES) or names.issuperset(table.LOCAL_NAMES)):
+    if table.is_written_track(names):
         return table.read_track(path), ()
     columns, guesses = guess_columns(path)
     if isinstance(columns, ImuColumns):

@@ -14,7 +14,7 @@ from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_confi
 from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
-from polyins.model.recording import FilterOptions, ImuStream, Offset, Recording
+from polyins.model.recording import FilterOptions, Heights, ImuStream, Offset, Recording
 from polyins.model.rig import Imu, Rig
 from polyins.reading import catalogue, clocks, usable
 from polyins.reading.imu_stream import as_mounted, read_imu
@@ -133,15 +133,21 @@ def assemble(
     """Read what a configuration names beside the IMUs, whose data cover `span`, and put all together."""
     notes: list[str] = []
     gnss = reference = geodetic = None
+    heights: Heights = "ellipsoidal"
     if config.gnss:
-        gnss, geodetic, texts = read_gnss(config.gnss, document, span)
+        gnss, geodetic, heights, texts = read_gnss(config.gnss, document, span)
         notes += texts
     if wheels_known:
         notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
     if config.reference:
-        _one_datum(config, document)
         reference, kind, texts = read_reference(config.reference, document, span)
         geodetic = _one_kind(geodetic, kind, document.place(["reference"]))
+        if gnss is None:
+            heights = reference.heights
+        elif (heights == "ellipsoidal") != (reference.heights == "ellipsoidal"):
+            raise document.error(
+                ["reference", "height"], "is as-given for one of gnss and reference; expected it for both, or neither"
+            )
         notes += texts
     if config.start.position:
         geodetic = _one_kind(geodetic, config.start.position.geodetic, document.place(["start", "position"]))
@@ -160,6 +166,8 @@ def assemble(
         name=config.name,
         warnings=(*notes, *texts),
         aiding=aiding,
+        heights=heights,
+        utc_of_zero=clocks.utc_of_zero(config),
     )
 
 
@@ -249,18 +257,6 @@ def _one_kind(known: bool | None, new: bool, place: str) -> bool:
         kinds = {True: "latitude and longitude", False: "on a local plane"}
         raise InputError(f"{place}: positions are {kinds[new]}, those before {kinds[known]}; expected one kind")
     return new
-
-
-def _one_datum(config: Config, document: Document) -> None:
-    """Refuse heights of which only one are left as they are: nothing says that they count from the same."""
-    if (
-        config.gnss
-        and config.reference
-        and (config.gnss.height == "as-given") != (config.reference.height == "as-given")
-    ):
-        raise document.error(
-            ["reference", "height"], "is as-given for one of gnss and reference; expected it for both, or neither"
-        )
 
 
 def _with_absolute_paths(config: Config, folder: Path, path: Path) -> Config:

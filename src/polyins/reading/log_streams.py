@@ -26,9 +26,13 @@ def track_of(path: str, stream: str) -> Track:
 
 
 def sensor_of(path: str, stream: str, kind: str) -> SensorRows:
-    """Return the rows of a sensor of that kind; raises InputError as `imu_of` does."""
+    """Return the rows of a sensor of that kind; raises InputError as `imu_of` does.
+
+    The speed over ground of a receiver is an odometer's where it is named: of a vehicle that does not slip.
+    """
     log = read_log(path)
-    return _chosen(path, stream, {name: rows for name, rows in log.sensors.items() if rows.kind == kind}, log)
+    kinds = {kind, "speed"} if kind == "odometer" and stream else {kind}
+    return _chosen(path, stream, {name: rows for name, rows in log.sensors.items() if rows.kind in kinds}, log)
 
 
 def is_log(path: str, stream: str) -> bool:

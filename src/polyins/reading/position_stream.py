@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,11 @@ from polyins.config import GeodeticPoint, GnssEntry, ReferenceEntry
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.files import find_named
-from polyins.formats import kf_gins, rtklib, table
+from polyins.formats import geoid, kf_gins, rtklib, table
 from polyins.formats.recognize import track_format
 from polyins.formats.rows import Track
 from polyins.model.geodesy import displacement
-from polyins.model.recording import Array, GnssStream, Reference
+from polyins.model.recording import Array, GnssStream, Heights, Reference
 from polyins.model.rig import DEG, check_lever_arm
 from polyins.reading.log_streams import track_of
 
@@ -40,7 +41,14 @@ def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) 
         track = _file_track(entry, kind)
     warnings = list(stream_checks.check_track(track, section))
     track = replace(track, time=track.time + entry.clock_offset_s)
-    return _above_ellipsoid(track, entry, section, document), warnings
+    raised = _above_ellipsoid(track, entry, section, document)
+    if raised is not track and entry.geoid_height_m is None:
+        by = float(np.median(raised.position[:, 2] - track.position[:, 2]))
+        warnings.append(
+            f"{track.source.path}: heights above the sea are brought above the ellipsoid by {geoid.MODEL}, {by:.1f} m "
+            "there, which is good to a metre; geoid_height_m takes its place"
+        )
+    return raised, warnings
 
 
 def _file_track(entry: GnssEntry | ReferenceEntry, kind: str) -> Track:
@@ -56,28 +64,49 @@ def _above_ellipsoid(track: Track, entry: GnssEntry | ReferenceEntry, section: s
             f"heights in {track.source.path} are above the sea; expected height: sea-level with geoid_height_m, or "
             "as-given to have the solution's above the sea",
         )
-    shift = height_shift(entry, track.geodetic, track.above_sea)
+    shift = height_shift(entry, track.position, track.geodetic, track.above_sea)
     if shift is None:
         raise document.error(
             [section, "height"],
             "sea-level heights need geoid_height_m; expected the height of the geoid above the ellipsoid at the "
-            "place, m",
+            "place, m, or a grid of it (pip install 'polyins[geoid]', from Python 3.12 on)",
         )
-    return track if shift == 0.0 else replace(track, position=track.position + np.array([0.0, 0.0, shift]))
+    if not np.any(shift):
+        return track
+    return replace(track, position=track.position + np.multiply.outer(shift, np.array([0.0, 0.0, 1.0])))
 
 
-def height_shift(entry: GnssEntry | ReferenceEntry, geodetic: bool, above_sea: bool) -> float | None:
-    """Return what to add to heights to have them above the ellipsoid, m; None: it is not known.
+def height_shift(
+    entry: GnssEntry | ReferenceEntry, position: Array, geodetic: bool, above_sea: bool
+) -> Array | float | None:
+    """Return what to add to heights to have them above the ellipsoid, m, of all or each; None: it is not known.
 
-    `geodetic`: the positions are; `above_sea`: whoever gives them says so, else the configuration may.
+    `position`: shape (..., 3); `geodetic`: it is; `above_sea`: whoever gives it says so, else the configuration may.
     """
     if entry.height == "as-given" or not geodetic or not (above_sea or entry.height == "sea-level"):
         return 0.0
-    return entry.geoid_height_m
+    return geoid.heights(position) if entry.geoid_height_m is None else entry.geoid_height_m
 
 
-def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStream, bool, list[str]]:
-    """Read the fixes; returns them, whether they are geodetic, and warnings. `span`: of the IMUs, s.
+def _heights(track: Track, entry: GnssEntry | ReferenceEntry) -> Heights:
+    """Return what the heights of a track that is read count from."""
+    if not track.geodetic or entry.height != "as-given":
+        return "ellipsoidal"
+    return "sea-level" if track.above_sea else "unknown"
+
+
+class ConfiguredGnss(NamedTuple):
+    """GNSS as it is read."""
+
+    stream: GnssStream
+    geodetic: bool
+    heights: Heights
+    """what geodetic ones count from"""
+    notes: list[str]
+
+
+def read_gnss(entry: GnssEntry, document: Document, span: Span) -> ConfiguredGnss:
+    """Read the fixes. `span`: of the IMUs, s.
 
     Raises InputError for data and settings that cannot be right.
     """
@@ -89,16 +118,19 @@ def read_gnss(entry: GnssEntry, document: Document, span: Span) -> tuple[GnssStr
         raise document.error(["gnss"], f"{track.source.path} has no position std; expected position_std_m")
     stream_checks.check_std(track.source, std)
     warnings += stream_checks.check_within(track.source, "GNSS", track.time, span)
-    if entry.height == "as-given" and track.geodetic:
+    heights = _heights(track, entry)
+    if heights != "ellipsoidal":
         datum = "the sea" if track.above_sea else "what those of the file are above, which is not known here"
         warnings.append(f"{track.source.path}: heights of the solution are above {datum}")
     track = _converted(track, entry, document)
     kept = thinned(track.time, entry.rate_hz) if entry.rate_hz else np.arange(len(track.time))
-    velocities = (None, None) if track.velocity is None else (track.velocity, track.velocity_std)
-    if track.velocity is not None and track.velocity_std is None:
-        warnings.append(f"{track.source.path}: GNSS velocity has no std and is not used")
-        velocities = None, None
-    return GnssStream(track.time, track.position, std, *velocities).at(kept), track.geodetic, warnings
+    velocity, velocity_std = track.velocity, track.velocity_std
+    if velocity is None or velocity_std is None:
+        if velocity is not None:
+            warnings.append(f"{track.source.path}: GNSS velocity has no std and is not used")
+        velocity = velocity_std = None
+    stream = GnssStream(track.time, track.position, std, velocity, velocity_std).at(kept)
+    return ConfiguredGnss(stream, track.geodetic, heights, warnings)
 
 
 def _converted(track: Track, entry: GnssEntry, document: Document) -> Track:
@@ -139,7 +171,8 @@ def read_reference(entry: ReferenceEntry, document: Document, span: Span) -> tup
     warnings += stream_checks.check_within(track.source, "reference", track.time, span)
     with document.at(["reference", "point_m"]):
         check_lever_arm("point", np.array(entry.point_m))
-    reference = Reference(track.time, track.position, track.velocity, track.attitude, np.array(entry.point_m))
+    point, heights = np.array(entry.point_m), _heights(track, entry)
+    reference = Reference(track.time, track.position, track.velocity, track.attitude, point, heights)
     return reference, track.geodetic, warnings
 
 

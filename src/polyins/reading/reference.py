@@ -8,7 +8,7 @@ from polyins.checks import stream_checks
 from polyins.errors import InputError
 from polyins.formats.recognize import data_format
 from polyins.formats.rows import Track
-from polyins.model.recording import Reference
+from polyins.model.recording import Heights, Reference
 from polyins.model.solution import Solution
 from polyins.reading.guess import read_stream
 from polyins.reading.loading import load
@@ -31,8 +31,15 @@ def load_reference(path: str | Path, solution: Solution) -> Reference:
             raise InputError(f"{path}: holds IMU data; expected positions")
         stream_checks.check_track(track, "reference")
         stream_checks.check_within(track.source, "reference", track.time, (solution.time[0], solution.time[-1]))
-        reference = Reference(track.time, track.position, track.velocity, track.attitude, solution.point)
+        above: Heights = "sea-level" if track.above_sea else "ellipsoidal"
+        if data_format(path) == "table":
+            above = solution.heights
+        reference = Reference(track.time, track.position, track.velocity, track.attitude, solution.point, above)
         geodetic = track.geodetic
+    if geodetic and {reference.heights, solution.heights} == {"sea-level", "ellipsoidal"}:
+        raise InputError(
+            f"{path}: heights are {reference.heights}, those of the solution {solution.heights}; expected both alike"
+        )
     if geodetic != solution.geodetic:
         kinds = {True: "latitude and longitude", False: "metres on a local plane"}
         raise InputError(f"{path}: holds {kinds[geodetic]}; expected {kinds[solution.geodetic]} as in the solution")

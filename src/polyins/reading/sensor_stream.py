@@ -12,9 +12,9 @@ from polyins.config.units import in_si, key_of, read
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.files import find_named
-from polyins.formats.columns import read_columns
+from polyins.formats.columns import column_names, read_columns
 from polyins.formats.rows import SensorRows
-from polyins.formats.table import SECONDS
+from polyins.formats.table import SECONDS, SENSOR_NAMES
 from polyins.model.recording import AidingStream, Array, NonholonomicOptions
 from polyins.model.rig import DEG, AidingSensor
 from polyins.reading.log_streams import is_log, sensor_of
@@ -28,13 +28,11 @@ UNITS = {
     "odometer": {"m/s": 1.0, "km/h": 1.0 / 3.6},
 }
 """SI per unit, of each kind; the usual unit first"""
-COLUMNS = {"height": "height_m", "heading": "heading_deg", "odometer": "speed_m_s"}
-"""of a table whose columns are not declared"""
 
 
 def entries(config: Config) -> Iterator[tuple[str, SensorEntry]]:
     """Give the kind and section of each sensor that is configured."""
-    for kind in COLUMNS:
+    for kind in SENSOR_NAMES:
         entry: SensorEntry | None = getattr(config, kind)
         if entry is not None:
             yield kind, entry
@@ -104,7 +102,11 @@ def _rows(kind: str, entry: SensorEntry, document: Document) -> SensorRows:
 
 def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorColumns, float]:
     """Return the columns and SI per unit of the value."""
-    columns = entry.columns or SensorColumns.model_validate({"time": {"name": "time_s"}, "value": COLUMNS[kind]})
+    columns = entry.columns
+    if columns is None:
+        std = f"std_{SENSOR_NAMES[kind]}"
+        known = {"std": std} if std in column_names(entry.file) else {}
+        columns = SensorColumns.model_validate({"time": {"name": "time_s"}, "value": SENSOR_NAMES[kind], **known})
     units = UNITS[kind]
     unit: str = columns.unit or next(iter(units))
     if unit not in units:

@@ -16,10 +16,18 @@ from polyins.config import Filter, HeadingEntry, HeightEntry, ImuEntry, Odometer
 from polyins.config.units import write as write_section
 from polyins.config.yaml_document import write_yaml
 from polyins.files import whole, write_bytes
-from polyins.formats.table import ATTITUDE_NAMES, GEODETIC_NAMES, LOCAL_NAMES, VELOCITY_NAMES, write_gnss, write_imu
+from polyins.formats.table import (
+    ATTITUDE_NAMES,
+    GEODETIC_NAMES,
+    LOCAL_NAMES,
+    SENSOR_NAMES,
+    VELOCITY_NAMES,
+    write_gnss,
+    write_imu,
+)
 from polyins.model.recording import AidingStream, Recording, Reference, StartOptions
 from polyins.model.rig import DEG, AidingSensor, Imu
-from polyins.reading.sensor_stream import COLUMNS, UNITS
+from polyins.reading.sensor_stream import UNITS
 
 Array = NDArray[np.float64]
 
@@ -66,7 +74,7 @@ def write_sensor(path: str | Path, stream: AidingStream) -> None:
     from pyarrow import parquet, table
 
     unit = next(iter(UNITS[stream.kind].values()))
-    columns = {"time_s": stream.time, COLUMNS[stream.kind]: stream.value / unit, "std": stream.std[:, 0] / unit}
+    columns = {"time_s": stream.time, SENSOR_NAMES[stream.kind]: stream.value / unit, "std": stream.std[:, 0] / unit}
     with whole(path) as beside:
         parquet.write_table(table(columns), beside)
 
@@ -117,7 +125,7 @@ def _sensor(sensor: AidingSensor, stream: AidingStream) -> dict[str, Any]:
     kind = sensor.kind
     entry = {
         "file": f"{kind}.parquet",
-        "columns": {"time": {"name": "time_s"}, "value": COLUMNS[kind], "std": "std"},
+        "columns": {"time": {"name": "time_s"}, "value": SENSOR_NAMES[kind], "std": "std"},
     } | write_section(SECTIONS[kind], sensor)
     if kind == "odometer":
         entry["right_std_m_s"], entry["down_std_m_s"] = stream.std[0, 1:].tolist()

@@ -10,6 +10,7 @@ import numpy as np
 from polyins.checks.stream_checks import FARTHEST_OFF_AXIS_M, GAP_INTERVALS, WHEEL_RATE_RAD_S, check_imu, check_track
 from polyins.errors import InputError
 from polyins.files import find
+from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
 from polyins.model.recording import Array
@@ -51,17 +52,26 @@ def _describe_log(path: str | Path, kind: str) -> Facts:
         "clock": log.clock,
         "utc_of_zero_s": log.utc_of_zero,
         "fix_age_s": log.fix_age,
-        "streams": [_describe_stream(name, rows, log.unusable.get(name)) for name, rows in log.streams.items()],
+        "streams": [_describe_stream(log, name) for name in log.streams],
         "problems": [] if log.streams else ["holds neither IMU data nor positions"],
         "warnings": list(log.notes),
     }
 
 
-def _describe_stream(name: str, rows: ImuRows | Track | SensorRows, why_not: str | None) -> Facts:
+def _describe_stream(log: Log, name: str) -> Facts:
     """Say what a stream of a log holds, and what it is good for."""
+    rows, why_not = log.streams[name], log.unusable.get(name)
     facts: Facts = {"kind": rows.kind, **_timing(rows.time)} if isinstance(rows, SensorRows) else describe(rows)
     problems = {} if isinstance(rows, SensorRows) else _problems(rows, ())
-    return {"stream": name, **facts, "usable": why_not is None, "not_used": why_not, **problems}
+    moved = log.clock_offsets.get(name)
+    return {
+        "stream": name,
+        **facts,
+        "added_to_stamps_s": moved,
+        "usable": why_not is None,
+        "not_used": why_not,
+        **problems,
+    }
 
 
 def listing(facts: Facts, indent: str = "") -> str:

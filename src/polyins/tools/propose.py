@@ -14,6 +14,7 @@ from polyins.config import NOISE_GRADES
 from polyins.config.yaml_document import Document, as_document
 from polyins.errors import InputError
 from polyins.files import find
+from polyins.formats import geoid
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track, intervals
@@ -45,6 +46,8 @@ LEAST_SIGMAS = 4.0
 """of what chance makes, by which a horizontal axis agrees with the acceleration of the speed if it is forward"""
 FEWEST_MEANS = 20
 """of a second, to tell which axis points forward"""
+BAROMETER_STD_M, BAROMETER_BIAS_M, WEATHER_M_SQRT_S = 1.0, 300.0, 0.1
+"""noise of a barometer on a vehicle; 35 hPa; 6 m in an hour"""
 HEADING_RATE_HZ = 1.0
 """errors of another filter last; taken at its own rate they would be averaged away"""
 
@@ -101,6 +104,8 @@ def propose(paths: Sequence[str | Path]) -> str:
         lines += ["", "heading:", *_heading_lines(heading)]
     for speed in speeds[:1]:
         lines += ["", "odometer:", *_odometer_lines(speed)]
+    for height in _sensors(read, "height")[:1] if "gnss" in sections[: len(tracks)] else []:
+        lines += ["", "height:", *_barometer_lines(height)]
     same_log = only_solution and tracks[0].log is not None and tracks[0].log is imus[0].log
     given = _given_start(tracks[0], span) if same_log and not headings else []
     lines += ["", "start:", *(given or [_start_line(bool(tracks) and not only_solution, tracks, headings)])]
@@ -351,6 +356,18 @@ def _odometer_lines(of: LogSource) -> list[str]:
     ]
 
 
+def _barometer_lines(of: LogSource) -> list[str]:
+    assert isinstance(of.rows, SensorRows)
+    std = f"  std_m: {BAROMETER_STD_M:g}  {CHECK} wind and rotors press on it as well"
+    return [
+        *_place_lines(of),
+        std,
+        f"  bias_std_m: {BAROMETER_BIAS_M:g}  {CHECK} by which the weather is off the standard atmosphere, and the sea",
+        f"  bias_random_walk_m_sqrt_s: {WEATHER_M_SQRT_S:g}  {CHECK} how fast the weather changes",
+        f"  position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
+    ]
+
+
 def _format_lines(of: LogSource, indent: str) -> list[str]:
     if of.log is not None:
         return [f"{indent}stream: {_quoted(of.stream)}"]
@@ -385,8 +402,17 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float], base: L
     if not track.datum_known:
         lines.append(f"  height: ellipsoidal  {CHECK} the log does not tell what heights are above; else sea-level")
     if track.above_sea:
-        lines.append(f"  height: as-given  {CHECK} above the sea; sea-level with geoid_height_m makes them ellipsoidal")
+        lines.append(_height_line())
     return lines
+
+
+def _height_line() -> str:
+    if geoid.library() is not None:
+        return f"  height: sea-level  {CHECK} above the sea; {geoid.MODEL} or geoid_height_m makes them ellipsoidal"
+    return (
+        f"  height: as-given  {CHECK} above the sea; sea-level with geoid_height_m, or a grid of it (pip install "
+        "'polyins[geoid]'), makes them ellipsoidal"
+    )
 
 
 def _clock_line(of: LogSource, span: tuple[float, float], base: Log | None) -> str:
@@ -413,9 +439,12 @@ def _between_clocks(of: Log | None, base: Log | None) -> float | None:
 
 
 def _heading_lines(of: LogSource) -> list[str]:
+    assert isinstance(of.rows, SensorRows)
+    told = of.rows.std is not None
+    how = "or leave it out, to take what the log tells" if told else "the log does not tell how good this heading is"
     return [
         *_place_lines(of),
-        f"  std_deg: {HEADING_STD_DEG:g}  {CHECK} the log does not tell how good this heading is",
+        f"  std_deg: {HEADING_STD_DEG:g}  {CHECK} {how}",
         f"  offset_std_deg: {HEADING_STD_DEG:g}  {CHECK} of a constant part of its error",
         f"  rate_hz: {HEADING_RATE_HZ:g}  # its errors last",
     ]

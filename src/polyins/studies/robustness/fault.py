@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +84,7 @@ def with_rows(recording: Recording, index: int, kept: Mask) -> Recording:
     return with_imu(recording, index, recording.imus[index].at(kept))
 
 
-def with_gnss(recording: Recording, **changes: Array) -> Recording:
+def with_gnss(recording: Recording, **changes: Any) -> Recording:
     """Return the recording with other columns of its fixes."""
     return replace(recording, gnss=replace(fixes(recording), **changes))
 
