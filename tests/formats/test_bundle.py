@@ -34,8 +34,18 @@ def test_names_and_contents(tmp_path: Path) -> None:
     assert Bundle(folder).names == ("b.csv", "a/imu.csv", "a/packed.csv")
     assert Bundle(folder).read("a/packed.csv") == b"packed"
     for bundle in (Bundle(folder), Bundle(archive)):
-        assert bundle.found(r"(\w+)\.csv")["imu"] == "a/imu.csv"
+        assert bundle.found(r"a/(\w+)\.csv")["imu"] == "a/imu.csv"
         assert bundle.read("a/imu.csv") == b"this is a/imu.csv"
+
+
+def test_files_of_several_recordings_are_not_mixed(tmp_path: Path) -> None:
+    bundle = Bundle(folder_with(tmp_path, "one/Gyroscope.csv", "two/Location.csv", "two/meta/time.csv"))
+    with pytest.raises(InputError, match="holds several recordings; expected one of one, two"):
+        bundle.found(r"(Gyroscope|Location)\.csv")
+    assert bundle.found(r"(?:meta/)?(Location|time)\.csv") == {
+        "Location": "two/Location.csv",
+        "time": "two/meta/time.csv",
+    }
 
 
 def test_of_pictures_not_all_names_are_taken(tmp_path: Path) -> None:
@@ -50,6 +60,10 @@ def test_an_archive_that_is_cut_off(tmp_path: Path) -> None:
         file.writestr("imu0/data.csv", "x" * 1000)
     whole = path.read_bytes()
     path.write_bytes(whole[:500])
+    with pytest.raises(InputError, match="is no whole zip archive"):
+        head(path, 10)
+    central = whole.index(b"PK\x01\x02")
+    path.write_bytes(whole[: central + 6] + b"\xcd" + whole[central + 7 :])  # a version that there is not
     with pytest.raises(InputError, match="is no whole zip archive"):
         head(path, 10)
     path.write_bytes(whole.replace(b"xxxx", b"xyxx", 1))

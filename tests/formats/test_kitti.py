@@ -76,7 +76,7 @@ def test_an_archive_and_several_drives(tmp_path: Path) -> None:
     assert data_format(archive) == "kitti-oxts"
     np.testing.assert_array_equal(read(archive).imus["imu"].dvel, read(path).imus["imu"].dvel)
     drive(tmp_path / "day", "2011_09_26_drive_0002_sync")
-    with pytest.raises(InputError, match=r"holds several drives; expected one of 2011_09_26_drive_0001_sync, 2011"):
+    with pytest.raises(InputError, match=r"holds several recordings; expected one of 2011_09_26_drive_0001_sync, 2011"):
         read(tmp_path / "day")
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from polyins.errors import InputError
-from polyins.formats.mimu4444 import CHIPS, PACKET, read
+from polyins.formats.mimu4444 import CHIPS, OTHER_SIDE, PACKET, read
 from polyins.formats.recognize import data_format, read_log
+from polyins.model.axes import Axes, axes_matrix
+from polyins.tools.propose import propose
 
 STEP = 1_024_000
 """ticks of a packet at 62.5 Hz"""
@@ -68,6 +71,30 @@ def test_a_file_that_begins_within_a_packet(tmp_path: Path) -> None:
     path.write_bytes(b"".join(packets(10))[50:])
     assert data_format(path) == "mimu4444"
     assert len(read(path).imus["imu1"].time) == 9
+
+
+def test_without_positions_all_chips_are_turned_alike(tmp_path: Path) -> None:
+    """The board lies on its side, so that gravity alone would give each side its own forward."""
+    path = tmp_path / "a.bin"
+    board = np.array([0, -2048, 0, 0, 0, 0])
+    mirror = np.array([2048, 0, 0, 0, 0, 0])  # -y, -x, -z of it
+    made = []
+    for k, one in enumerate(packets(200)):
+        packet = np.frombuffer(one, PACKET).copy()
+        packet["values"] = [[board, mirror][chip % 2] for chip in range(CHIPS)]
+        packet["values"][:, :, 3:] = k % 2
+        content = packet.tobytes()[:-2]
+        made.append(content + (sum(content) & 0xFFFF).to_bytes(2, "big"))
+    path.write_bytes(b"".join(made))
+    text = propose([path])
+    assert text.count("axes: [x, y, z]") == 0
+    odd, even = (axes_matrix(axes) for axes in named_axes(text)[:2])
+    np.testing.assert_array_equal(even, odd @ axes_matrix(OTHER_SIDE))
+    assert (odd @ board[:3])[2] == -2048
+
+
+def named_axes(text: str) -> list[Axes]:
+    return [(found[1], found[2], found[3]) for found in re.finditer(r"axes: \[(\S+), (\S+), (\S+)\]", text)]
 
 
 def test_where_the_chips_are(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from scipy.io import savemat
 from polyins.errors import InputError
 from polyins.formats.navego import read
 from polyins.formats.recognize import data_format, read_log
+from polyins.tools.inspect import inspect
 from polyins.tools.propose import propose
 
 
@@ -83,7 +84,7 @@ def test_imus_receiver_and_reference(version: str, tmp_path: Path) -> None:
     assert log.references == {"ref"}
     assert log.antenna == (0.1, 0.2, -1.5)
     assert log.noise["imu1"] == (6e-4, 3.3e-3)
-    assert "what heights are above" in log.notes[0]
+    assert not track.datum_known
 
 
 def test_the_proposal(tmp_path: Path) -> None:
@@ -93,6 +94,8 @@ def test_the_proposal(tmp_path: Path) -> None:
     assert "axes: [x, y, z]  # forward, right, down, as the format has them" in text
     assert "angle_random_walk_deg_sqrt_h: 2.06, velocity_random_walk_m_s_sqrt_h: 0.198" in text
     assert "antenna_position_m: [0.1, 0.2, -1.5]" in text
+    assert text.count("height: ellipsoidal  # CHECK: the log does not tell what heights are above") == 2
+    assert [one["heights"] for one in inspect(path)["streams"] if one["kind"] == "positions"] == ["unknown"] * 2
     assert "stream: 'ref'" in text.split("reference:")[1]
 
 
@@ -112,6 +115,14 @@ def test_what_is_none_of_it_is_refused(tmp_path: Path) -> None:
     one["wb"] = one["wb"][:-1]
     savemat(path, {"imu": one})
     with pytest.raises(InputError, match=r"imu\.wb is 199 by 3; expected 200 by 3, as imu\.t"):
+        read(path)
+
+
+def test_random_bytes_after_the_signature(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    path.write_bytes(b"MATLAB 5.0 MAT-file" + np.random.default_rng(2).bytes(16800))
+    assert data_format(path) == "navego"
+    with pytest.raises(InputError, match="cannot be read as MATLAB"):
         read(path)
 
 

@@ -63,7 +63,7 @@ def test_rows_of_doubles_are_known_without_their_first_and_last(tmp_path: Path) 
     assert data_format(path) == "kf-gins"
 
 
-SIGNATURES = {"SQLite": b"SQLite format 3\0", "MATLAB": b"MATLAB 5.0 MAT-file"}
+SIGNATURES = {"SQLite": b"SQLite format 3\0", "HDF5": b"\x89HDF\r\n\x1a\n"}
 
 
 @pytest.mark.parametrize("name", SIGNATURES)

@@ -58,6 +58,35 @@ def test_imu_and_receiver(tmp_path: Path) -> None:
     assert not track.above_sea
 
 
+EULER = (
+    "timestamp\tstatus\troll\tpitch\tyaw\trollStd\tpitchStd\tyawStd\n"
+    "(us)\t(na)\t(deg)\t(deg)\t(deg)\t(deg)\t(deg)\t(deg)\n"
+)
+NAV = (
+    "timestamp\tstatus\tvelN\tvelE\tvelD\tvelStdN\tvelStdE\tvelStdD\tlatitude\tlongitude\taltitude\tlatitudeStd\t"
+    "longitudeStd\taltitudeStd\tundulation\n(us)\t(na)\t(m.s^-1)\t(m.s^-1)\t(m.s^-1)\t(m.s^-1)\t(m.s^-1)\t(m.s^-1)\t"
+    "(deg)\t(deg)\t(m)\t(m)\t(m)\t(m)\t(m)\n"
+)
+
+
+@pytest.mark.parametrize("std", [2.0, 60.0])
+def test_its_own_filter_is_a_reference_and_a_heading(std: float, tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    stamps = [1_000_000 + 20_000 * k for k in range(25)]
+    (path / "euler.txt").write_text(EULER + "".join(f"{t}\t7\t1.0\t2.0\t90.0\t0.1\t0.1\t{std}\n" for t in stamps))
+    row = "{}\t7\t1\t2\t3\t0.1\t0.1\t0.1\t48.0\t11.0\t450.0\t1.0\t1.0\t1.0\t47.5\n"
+    (path / "nav.txt").write_text(NAV + "".join(row.format(t) for t in stamps))
+    log = read(path)
+    assert log.references == {"nav"}
+    track, heading = log.tracks["nav"], log.sensors["euler"]
+    assert track.position[0, 2] == 497.5
+    np.testing.assert_array_equal(track.velocity[3], [1, 2, 3])
+    np.testing.assert_allclose(track.attitude[3], np.radians([1, 2, 90]))
+    np.testing.assert_allclose((heading.value[3], heading.std[3]), np.radians([90, std]))
+    assert ("euler" in log.unusable) == (std > 10.0)
+    assert "nav" not in log.unusable
+
+
 def test_without_undulation_heights_are_above_the_sea(tmp_path: Path) -> None:
     path = folder(tmp_path)
     text = (path / "gnss1Pos.txt").read_text().replace("undulation", "else").replace("\t47.5\t", "\t\t")

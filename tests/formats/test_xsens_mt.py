@@ -69,6 +69,22 @@ def test_heading_of_the_x_axis(frame: str, yaw: float, heading: float, tmp_path:
     assert read(path).sensors == {}
 
 
+@pytest.mark.parametrize("parts", [["q0", "q1", "q2", "q3"], ["w", "x", "y", "z"]])
+def test_increments_where_there_are_no_rates(parts: list[str], tmp_path: Path) -> None:
+    names = ["PacketCounter", "SampleTimeFine", "VelInc_X", "VelInc_Y", "VelInc_Z", *(f"OriInc_{one}" for one in parts)]
+    turn = np.array([0.003, -0.004, 0.012])
+    half = 0.5 * np.linalg.norm(turn)
+    quaternion = [-np.cos(half), *(-turn / np.linalg.norm(turn) * np.sin(half))]  # the same turn as with +
+    rows = [[k, 100 * k, 0.001, 0.002, 0.098, *quaternion] for k in range(9)]
+    rows[4][5:] = [1.0, 0.0, 0.0, 0.0]
+    path = write(tmp_path / "a.txt", rows, names)
+    assert data_format(path) == "xsens-mt"
+    imu = read(path).imus["imu"]
+    np.testing.assert_allclose(imu.dtheta[[3, 4]], [turn, [0, 0, 0]], atol=1e-12)
+    np.testing.assert_array_equal(imu.dvel[3], [0.001, 0.002, 0.098])
+    assert (imu.gyro_unit, imu.accel_unit) == ("rad", "m/s")
+
+
 def test_rows_without_rates_and_a_cut_end(tmp_path: Path) -> None:
     rows = [row(k, 100 * k) for k in range(9)]
     rows[4][2:] = [""] * 6
@@ -83,3 +99,8 @@ def test_a_dot_is_none(tmp_path: Path) -> None:
     path = tmp_path / "dot.csv"
     path.write_text("DeviceTag:,DOT1\n" + ",".join(NAMES) + "\n" + "1,2,0,0,9.8,1,1,1\n" * 3)
     assert data_format(path) == "xsens-dot"
+    path.write_text("DeviceTag:\tDOT1\n" + "\t".join(NAMES) + "\n" + "1\t2\t0\t0\t9.8\t1\t1\t1\n" * 3)
+    assert data_format(path) == "xsens-dot"
+    path.write_text("\t".join(NAMES) + "\n" + "".join(f"{k}\t{16667 * k}\t0\t0\t9.8\t1\t1\t1\n" for k in range(9)))
+    with pytest.raises(InputError, match=r"makes 0\.6 Hz; is it the export of a DOT"):
+        read(path)

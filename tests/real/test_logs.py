@@ -252,6 +252,17 @@ def test_the_common_drive(name: str, turned: list[int], offset: float, logs: Pat
     np.testing.assert_allclose(values[:, 3:], wanted[:, 4:7] * turned, atol=6e-5, rtol=1e-4)
 
 
+def test_a_folder_of_a_phone(logs: Path) -> None:
+    rows = read_log(logs / "cases" / "split-gyro-accel").imus["imu"]
+    values = np.column_stack([rows.dtheta, rows.dvel]) / intervals(rows.time)[:, None]
+    wanted = common_imu(logs)
+    off = values - np.column_stack([np.interp(rows.time, wanted[:, 0], axis) for axis in wanted[:, 1:].T])
+    off -= off.mean(axis=0)  # biases of the common drive
+    assert np.sqrt(np.mean(off[:, :3] ** 2)) < 0.01
+    assert np.sqrt(np.mean(off[:, 3:] ** 2)) < 0.1
+    assert 1.0 / np.median(np.diff(rows.time)) == pytest.approx(40.0, rel=0.01)
+
+
 def test_positions_of_a_tracker(logs: Path) -> None:
     track = read_log(logs / "cases" / "euroc").tracks["leica0"]
     assert (len(track.time), track.geodetic) == (80, False)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import gzip
+import os
 import re
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes, read_head
@@ -39,14 +39,17 @@ class Bundle:
             return tuple(name for name in archive.namelist() if not name.endswith("/"))
 
     def found(self, pattern: str) -> dict[str, str]:
-        """Return names that end in what a regular expression says, by what its first group says, else by themselves."""
-        fitting = re.compile(rf"(?:.*/)?{pattern}")
-        matches = ((name, fitting.fullmatch(name)) for name in self.names if "__MACOSX/" not in name)
-        found: dict[str, str] = {}
-        for name, match in matches:
-            if match:
-                found.setdefault(match[1] if match.lastindex else name, name)
-        return found
+        """Return the names that end in what a regular expression says, by what its group says.
+
+        Raises InputError if they stand in several folders: those are several recordings.
+        """
+        fitting = re.compile(rf"((?:.*?/)??){pattern}")
+        matches = [match for name in self.names if "__MACOSX/" not in name and (match := fitting.fullmatch(name))]
+        folders = sorted({match[1] for match in matches})
+        if len(folders) > 1:
+            each = ", ".join(folder.rstrip("/") or "itself" for folder in folders)
+            raise InputError(f"{self.path}: holds several recordings; expected one of {each}")
+        return {match[2]: match[0] for match in matches}
 
     def inside(self, folder: str) -> list[str]:
         """Return the names of all files directly in a folder, in order."""
@@ -68,7 +71,7 @@ class Bundle:
     def _unpacked(self, archive: ZipFile, name: str) -> bytes:
         try:
             content = archive.read(name)
-        except (BadZipFile, OSError, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
+        except Exception as error:  # damage makes it raise whatever it stumbles over
             raise InputError(f"{self.path}, {name}: cannot be unpacked ({error}); is it damaged?") from error
         if not content.strip():
             raise InputError(f"{self.path}, {name}: is empty; expected data")
@@ -98,13 +101,14 @@ def state(path: Path) -> tuple[int, int]:
 def _archive(path: Path) -> ZipFile:
     try:
         return ZipFile(path)
-    except (BadZipFile, OSError) as error:
+    except Exception as error:  # damage makes it raise whatever it stumbles over
         raise InputError(f"{path}: is no whole zip archive ({error}); is it cut off?") from error
 
 
 def _names(folder: Path, prefix: str, deep: int) -> Iterator[str]:
     try:
-        entries = sorted(folder.iterdir())
+        with os.scandir(folder) as listed:
+            entries = sorted(listed, key=lambda entry: entry.name)
     except OSError as error:
         raise InputError(f"{folder}: cannot be listed ({error.strerror})") from error
     files = [entry for entry in entries if entry.is_file()]
@@ -112,4 +116,4 @@ def _names(folder: Path, prefix: str, deep: int) -> Iterator[str]:
         yield prefix + entry.name.removesuffix(".gz")
     folders = [entry for entry in entries if entry.is_dir() and not entry.is_symlink()] if deep > 1 else []
     for entry in folders[:MOST_OF_A_FOLDER]:
-        yield from _names(entry, f"{prefix}{entry.name}/", deep - 1)
+        yield from _names(Path(entry), f"{prefix}{entry.name}/", deep - 1)

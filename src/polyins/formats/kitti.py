@@ -21,6 +21,7 @@ from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
 VALUES = 30
+DATE = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d{1,9})?"
 NORTH_EAST_VELOCITY, UP_VELOCITY = slice(6, 8), 10
 FORCES, RATES = slice(11, 14), slice(17, 20)
 POSITION_STD, VELOCITY_STD = 23, 24
@@ -55,17 +56,14 @@ def read(path: str | Path) -> Log:
         upright=True,
         axes={"imu": FORWARD_LEFT_UP},
         references=frozenset({"pose"}),
-        notes=(*notes, "pose: the solution of the OXTS itself; what its heights are above the files do not tell"),
+        notes=(*notes, "pose: the solution of the OXTS itself, no measurement"),
     )
 
 
 def _folder(files: Bundle) -> str:
-    """Return the folder of the one stream there is, with its `/`; raises InputError for several."""
-    stamps = list(files.found(r"oxts/timestamps\.txt")) or ["timestamps.txt"]
-    if len(stamps) > 1:
-        drives = ", ".join(name.removesuffix("/oxts/timestamps.txt") for name in stamps)
-        raise InputError(f"{files.path}: holds several drives; expected one of {drives}")
-    return stamps[0].removesuffix("timestamps.txt")
+    """Return the folder of the one stream there is, with its `/`; raises InputError for several drives."""
+    stamps = files.found(r"oxts/(timestamps)\.txt").get("timestamps", "timestamps.txt")
+    return stamps.removesuffix("timestamps.txt")
 
 
 def _rows(files: Bundle, folder: str) -> tuple[Array, Array, list[str]]:
@@ -107,10 +105,13 @@ def _numbers(content: bytes) -> list[float]:
 
 
 def _stamp(path: Path, line: str, number: int) -> float:
+    place = f"{path}, timestamps.txt, line {number + 1}"
+    if not re.fullmatch(DATE, line.strip()):
+        raise InputError(f"{place}: {line.strip()!r}; expected a date like 2011-09-26 13:02:25.964389445")
     try:
         instant = np.datetime64(line.strip().replace(" ", "T"), "ns")
     except ValueError as error:
-        raise InputError(f"{path}, timestamps.txt, line {number + 1}: {line.strip()!r}; expected a date") from error
+        raise InputError(f"{place}: {error}; expected a date") from error
     return float(instant.astype(np.int64)) * 1e-9
 
 
@@ -125,6 +126,7 @@ def _pose(path: Path, time: Array, values: Array) -> Track:
         RowSource(f"{path}, pose"),
         time[kept],
         values[:, :3] * [DEG, DEG, 1.0],
+        datum_known=False,
         position_std=std if (std > 0.0).all() else None,
         velocity=np.column_stack([values[:, NORTH_EAST_VELOCITY], -values[:, UP_VELOCITY]]),
         velocity_std=velocity_std if (velocity_std > 0.0).all() else None,

@@ -16,7 +16,7 @@ from polyins.files import find, read_bytes
 from polyins.formats.gps_time import WEEK_S, utc_of_week
 from polyins.formats.log import Log, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, Track
-from polyins.formats.text_rows import TextRows, header_line, read_rows
+from polyins.formats.text_rows import TextRows, header_line, lines_before, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG, STANDARD_GRAVITY
 
@@ -40,10 +40,10 @@ def read(path: str | Path) -> Log:
     found = find(path)
     content = read_bytes(found)
     header = header_line(content, HEADER) or 0
-    line = content.split(b"\n", header + 1)[header]
-    delimiter = next((mark for mark in ";\t," if mark.encode() in line), ",")
-    if b"DecimalSeparator=comma" in content[: 1 << 12]:
-        content = content.replace(b",", b".") if delimiter != "," else content
+    *session, names = lines_before(content, header)
+    delimiter = next((mark for mark in ";\t," if mark in names), ",")
+    if "DecimalSeparator=comma" in session and delimiter != ",":
+        content = content.replace(b",", b".")
     rows = read_rows(str(found), content, header, delimiter, wanted=VALUES)
     stamped = np.nan_to_num(rows.columns["GPS TOW"]) > 0.0
     if not stamped.any():

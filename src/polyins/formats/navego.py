@@ -52,7 +52,6 @@ def read(path: str | Path) -> Log:
         antenna=_antenna(places[receivers[0]]) if receivers else None,
         noise={name: noise for name, one in imus.items() if (noise := _noise(one))},
         references=references,
-        notes=tuple(f"{name}: what heights are above the file does not tell" for name in places),
     )
 
 
@@ -116,6 +115,7 @@ def _track(path: Path, name: str, struct: Struct) -> Track:
         RowSource(f"{path}, {name}"),
         time,
         place,
+        datum_known=False,
         position_std=_std(struct, "stdm", len(time)),
         velocity=velocity if velocity_std is not None or attitude is not None else None,
         velocity_std=velocity_std if velocity is not None else None,

@@ -25,7 +25,7 @@ from polyins.model.rig import DEG
 from polyins.prepare.timesync import GAP
 
 GYROSCOPE = "Gyroscope"
-SENSOR = r"(Gyroscope|Accelerometer|TotalAcceleration|Gravity|Location|Linear Accelerometer)\.csv"
+FILE = r"(?:meta/)?(Gyroscope|Accelerometer|TotalAcceleration|Gravity|Location|Linear Accelerometer|Metadata|time)\.csv"
 TEXTS = ("Metadata", "time")
 NANOSECONDS = "time"
 """the stamps of Sensor Logger; those of phyphox are in a column Time (s)"""
@@ -64,7 +64,7 @@ def read(path: str | Path) -> Log:
 
 
 def _contents(files: Bundle) -> dict[str, bytes]:
-    found = files.found(SENSOR) | files.found(r"(Metadata)\.csv") | files.found(r"meta/(time)\.csv")
+    found = files.found(FILE)
     return dict(zip(found, files.read_all(list(found.values())), strict=True))
 
 
@@ -182,7 +182,7 @@ def _sensor_logger(path: Path, tables: dict[str, TextRows], metadata: str) -> Lo
 
 def _specific_force(path: Path, tables: dict[str, TextRows], metadata: str, notes: list[str]) -> _Samples | None:
     """Return the acceleration with gravity; raises InputError if its sign cannot be known."""
-    if "TotalAcceleration" in tables:  # of Android alone
+    if "TotalAcceleration" in tables and _platform(metadata)[0] != "ios":  # of Android alone, as documented
         return _three(path, "TotalAcceleration", tables["TotalAcceleration"], "m/s^2")
     if "Accelerometer" not in tables or "Gravity" not in tables:
         notes.append("no TotalAcceleration.csv, nor Accelerometer.csv with Gravity.csv: there is no specific force")
@@ -192,16 +192,21 @@ def _specific_force(path: Path, tables: dict[str, TextRows], metadata: str, note
     return _Samples(moved.time[known], _sign(path, metadata) * (moved.value + gravity)[known])
 
 
-def _sign(path: Path, metadata: str) -> float:
+def _platform(metadata: str) -> tuple[str, bool]:
+    """Return the system of the phone, and whether what iOS has otherwise was made like Android's."""
     lines = [line.split(",") for line in metadata.splitlines()]
     said = dict(zip(lines[0], lines[1], strict=False)) if len(lines) > 1 else {}
-    platform = said.get("platform", "").strip().lower()
+    return said.get("platform", "").strip().lower(), said.get("standardisation", "").strip().lower() == "true"
+
+
+def _sign(path: Path, metadata: str) -> float:
+    platform, standard = _platform(metadata)
     if platform not in ("ios", "android"):
         raise InputError(
             f"{path}: no Metadata.csv that tells the platform; expected it, since accelerations of iOS and Android "
             "have opposite signs"
         )
-    return -1.0 if platform == "ios" and said.get("standardisation", "").strip().lower() != "true" else 1.0
+    return -1.0 if platform == "ios" and not standard else 1.0
 
 
 def _location(

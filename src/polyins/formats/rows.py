@@ -60,6 +60,8 @@ class Track:
     geodetic: bool = True
     above_sea: bool = False
     """heights are above the sea (geoid), not above the ellipsoid"""
+    datum_known: bool = True
+    """whether the format says which of the two"""
     position_std: Array | None = None
     """m north, east, down, shape (M, 3)"""
     velocity: Array | None = None

@@ -8,6 +8,7 @@ ellipsoid.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +18,29 @@ from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.bundle import LISTING, Bundle, is_bundle
 from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.formats.text_rows import TextRows, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
 HEADER = b"status\taccelX\taccelY\taccelZ\tgyroX\tgyroY\tgyroZ"
-FILE = r"(imuData|imuShort|imuFast|(?:gnss|gps)[12](?:Pos|Vel))\.txt"
+FILE = r"(imuData|imuShort|imuFast|(?:gnss|gps)[12](?:Pos|Vel)|euler|nav)\.txt"
 FORCES, RATES = ("accelX", "accelY", "accelZ"), ("gyroX", "gyroY", "gyroZ")
 PLACE, PLACE_STD = ("latitude", "longitude", "altitude"), ("latitudeStd", "longitudeStd", "altitudeStd")
 VELOCITY, VELOCITY_STD = ("velN", "velE", "velD"), ("velStdN", "velStdE", "velStdD")
-VALUES = "|".join(["timestamp", "gpsTow", "undulation", *FORCES, *RATES, *PLACE, *PLACE_STD, *VELOCITY, *VELOCITY_STD])
-UNITS = {"accelX": "(m.s^-2)", "gyroX": "(deg.s^-1)", "latitude": "(deg)", "altitude": "(m)", "velN": "(m.s^-1)"}
+ATTITUDE, YAW_STD = ("roll", "pitch", "yaw"), "yawStd"
+NAMES = (*FORCES, *RATES, *PLACE, *PLACE_STD, *VELOCITY, *VELOCITY_STD, *ATTITUDE, YAW_STD)
+VALUES = "|".join(["timestamp", "gpsTow", "undulation", *NAMES])
+LEAST_SURE_DEG = 10.0
+"""of a heading that is one"""
+UNITS = {
+    "yaw": "(deg)",
+    "accelX": "(m.s^-2)",
+    "gyroX": "(deg.s^-1)",
+    "latitude": "(deg)",
+    "altitude": "(m)",
+    "velN": "(m.s^-1)",
+}
 COUNTER_RANGE = 2**32
 
 
@@ -50,8 +62,11 @@ def read(path: str | Path) -> Log:
             tracks[name] = track
     unusable = dict.fromkeys(list(imus)[1:], "is the same IMU")
     unusable |= dict.fromkeys(list(tracks)[1:], "only one receiver can aid the filter")
+    headings = _headings(found, tables.get("euler"), unusable)
+    if "nav" in tables and (track := _track(found, "nav", tables["nav"], tables["nav"])):
+        tracks["nav"] = replace(track, attitude=_attitude(track.time, tables.get("euler")))
     warnings = tuple(text for rows in tables.values() for text in rows.warnings)
-    return Log("boot", imus, tracks, {}, unusable, notes=warnings)
+    return Log("boot", imus, tracks, headings, unusable, references=frozenset({"nav"}), notes=warnings)
 
 
 def _contents(path: Path) -> dict[str, bytes]:
@@ -115,17 +130,44 @@ def _track(path: Path, name: str, rows: TextRows, speeds: TextRows | None) -> Tr
     )
 
 
+def _rows_of(stamps: Array, wanted: Array) -> list[int]:
+    """Return the row of each stamp, -1 where there is none."""
+    at = {stamp: row for row, stamp in enumerate(stamps)}
+    return [at.get(stamp, -1) for stamp in wanted]
+
+
+def _attitude(time: Array, angles: TextRows | None) -> Array | None:
+    """Return roll, pitch, heading, rad, of the same stamps, if each has them."""
+    if angles is None or not angles.has(*ATTITUDE):
+        return None
+    found = _rows_of(angles.columns["timestamp"], time)
+    attitude = angles.of(*ATTITUDE)[found] * DEG
+    return attitude if min(found) >= 0 and np.isfinite(attitude).all() else None
+
+
+def _headings(path: Path, angles: TextRows | None, unusable: dict[str, str]) -> dict[str, SensorRows]:
+    """Return the heading of the sensor's own filter; it is not to be used if that is not sure of it."""
+    if angles is None or not angles.has(*ATTITUDE, YAW_STD):
+        return {}
+    rows = angles.whole("timestamp", "yaw", YAW_STD)
+    kept = rising(rows.columns["timestamp"])
+    time, yaw, std = rows.of("timestamp", "yaw", YAW_STD)[kept].T
+    if not np.median(std) < LEAST_SURE_DEG:
+        unusable["euler"] = f"the sensor's filter knows its heading to {np.median(std):.0f} deg only"
+    return {"euler": SensorRows(RowSource(f"{path}, euler"), "heading", time, yaw * DEG, std * DEG)}
+
+
 def _all(rows: TextRows, names: tuple[str, ...]) -> Array:
     """Return columns, NaN where there is none."""
     return rows.of(*names) if all(name in rows.columns for name in names) else np.full((len(rows), len(names)), np.nan)
 
 
 def _velocity(rows: TextRows, kept: NDArray[np.intp], speeds: TextRows | None) -> tuple[Array | None, Array | None]:
-    """Return velocity and std of the same times of the week, if each fix has them."""
-    if speeds is None or not speeds.has("gpsTow", *VELOCITY, *VELOCITY_STD) or not rows.has("gpsTow"):
+    """Return velocity and std of the same times of the week, else stamps, if each fix has them."""
+    if speeds is None or not speeds.has(*VELOCITY, *VELOCITY_STD):
         return None, None
-    at = {tow: row for row, tow in enumerate(speeds.columns["gpsTow"])}
-    found = [at.get(tow, -1) for tow in rows.columns["gpsTow"][kept]]
+    stamp = "gpsTow" if rows.has("gpsTow") and speeds.has("gpsTow") else "timestamp"
+    found = _rows_of(speeds.columns[stamp], rows.columns[stamp][kept])
     velocity, std = speeds.of(*VELOCITY)[found], speeds.of(*VELOCITY_STD)[found]
     whole = min(found) >= 0 and np.isfinite(velocity).all() and (std > 0.0).all()
     return (velocity, std) if whole else (None, None)

@@ -41,8 +41,15 @@ class TextRows:
 
     def whole(self, *names: str) -> TextRows:
         """Return the rows with a number in each of these."""
-        kept = np.isfinite(self.of(*names)).all(axis=1)
+        kept = np.all([np.isfinite(self.columns[name]) for name in names], axis=0)
+        if kept.all():
+            return self
         return TextRows({name: values[kept] for name, values in self.columns.items()}, self.first_line, self.warnings)
+
+
+def lines_before(content: bytes, line: int) -> list[str]:
+    """Return the first lines, with that of the number given, counted from 0, as the last."""
+    return content[: _offset(content, line + 1)].decode("utf-8-sig", errors="replace").splitlines()
 
 
 def header_line(content: bytes, pattern: str) -> int | None:
@@ -65,15 +72,16 @@ def read_rows(
     names = [name.strip().strip('"').strip() for name in line.split(delimiter)]
     places = {name: names.index(name) for name in names if name and re.fullmatch(wanted, name)}
     first = header + 1 + unit_lines
-    rows = content[_offset(content, first) :].rstrip()
+    rows = content[_offset(content, first) : _end(content)]
     if not rows:
         return TextRows({name: np.zeros(0) for name in places}, first + 1)
-    fields = rows.partition(b"\n")[0].rstrip(b"\r").split(delimiter.encode())
+    end = rows.find(b"\n")
+    fields = rows[: end if end >= 0 else len(rows)].rstrip(b"\r").split(delimiter.encode())
     ends_empty = (
         len(fields) == len(names) + 1 and not fields[-1].strip()
     )  # rows end in a delimiter, the header does not
     columns, bad = _columns(rows, delimiter, len(names) + ends_empty, places)
-    last = rows.count(b"\n")
+    last = rows.count(b"\n") if bad else 0
     for row, why in bad:
         if row != last:
             raise InputError(f"{place}, line {first + row + 1}: {why}")
@@ -133,6 +141,14 @@ def _numbers(cells: Any, name: str) -> tuple[Array, list[Bad]]:
         except ValueError:
             bad.append((row, f"{name} is {text!r}; expected a number"))
     return values, bad
+
+
+def _end(content: bytes) -> int:
+    """Return where the last line ends, without blank lines after it; nothing large is copied."""
+    end = len(content)
+    while end and content[end - 1 : end].isspace():
+        end -= 1
+    return end
 
 
 def _offset(content: bytes, line: int) -> int:

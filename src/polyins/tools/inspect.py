@@ -185,7 +185,7 @@ def _positions(track: Track) -> Facts:
     names = ("latitude_deg", "longitude_deg") if track.geodetic else ("north_m", "east_m")
     return {
         "geodetic": track.geodetic,
-        "heights": "sea-level" if track.above_sea else "ellipsoidal" if track.geodetic else "local",
+        "heights": _heights(track),
         "first": {name: _number(value) for name, value in zip((*names, "height_m"), first, strict=True)},
         "median_std_m": None if std is None else [_number(value) for value in np.median(std, axis=0)],
         "velocity": track.velocity is not None,
@@ -193,6 +193,14 @@ def _positions(track: Track) -> Facts:
         "quality": track.quality or None,
         "nan_values": int(np.sum(~np.isfinite(track.position))),
     }
+
+
+def _heights(track: Track) -> str:
+    if not track.geodetic:
+        return "local"
+    if not track.datum_known:
+        return "unknown"
+    return "sea-level" if track.above_sea else "ellipsoidal"
 
 
 def _number(value: Any) -> float | None:

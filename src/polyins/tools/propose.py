@@ -98,7 +98,7 @@ def propose(paths: Sequence[str | Path]) -> str:
         tracks.insert(1, tracks.pop())
     sections = ["reference"] if only_solution else ["gnss", "reference"]
     for section, track in zip(sections, tracks, strict=False):
-        lines += ["", f"{section}:", *_track_lines(section, track, span)]
+        lines += ["", f"{section}:", *_track_lines(section, track, span, imus[0].log)]
     lines += [f"{CHECK} {one.place} also holds positions and is not used" for one in tracks[len(sections) :]]
     for heading in headings[:1]:
         lines += ["", "heading:", *_heading_lines(heading)]
@@ -106,7 +106,8 @@ def propose(paths: Sequence[str | Path]) -> str:
         lines += ["", "odometer:", *_odometer_lines(speed)]
     for height in _sensors(read, "height")[:1] if "gnss" in sections[: len(tracks)] else []:
         lines += ["", "height:", *_barometer_lines(height)]
-    given = _given_start(tracks[0], span) if only_solution and not headings else []
+    same_log = only_solution and tracks[0].log is not None and tracks[0].log is imus[0].log
+    given = _given_start(tracks[0], span) if same_log and not headings else []
     lines += ["", "start:", *(given or [_start_line(bool(tracks) and not only_solution, tracks, headings)])]
     return "\n".join(lines) + "\n"
 
@@ -198,7 +199,7 @@ def _given_start(of: LogSource, span: tuple[float, float]) -> list[str]:
     """Return the state that a log's reference has when the IMUs begin: without other aids nothing tells it better."""
     track = of.rows
     assert isinstance(track, Track)
-    if of.log is None or track.velocity is None or track.attitude is None or track.time[-1] < span[0]:
+    if track.velocity is None or track.attitude is None or track.time[-1] < span[0]:
         return []
     row = int(np.searchsorted(track.time, span[0]))
     roll, pitch, heading = (float(angle) for angle in np.round(track.attitude[row] / DEG, 6))
@@ -275,7 +276,7 @@ def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) 
     if imu.log is not None and imu.log.upright:
         own = imu.log.axes.get(imu.stream, SENSOR_AXES)
         return [f"    axes: [{', '.join(own)}]  # forward, right, down, as the format has them"]
-    if imu.log is not None and imu.stream in imu.log.points and imu.log.imus:
+    if imu.log is not None and (imu.log.axes or imu.stream in imu.log.points):
         axes = composed(_shared_axes(imu.log), imu.log.axes.get(imu.stream, SENSOR_AXES))
         return [
             f"    axes: [{', '.join(axes)}]  {CHECK} as the log has them to each other, turned upright; "
@@ -381,7 +382,7 @@ def _format_lines(of: LogSource, indent: str) -> list[str]:
     return lines
 
 
-def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list[str]:
+def _track_lines(section: str, of: LogSource, span: tuple[float, float], base: Log | None) -> list[str]:
     track = of.rows
     assert isinstance(track, Track)
     facts = describe(track)
@@ -389,7 +390,7 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list
         f"  file: {_quoted(of.path)}",
         *_format_lines(of, "  "),
         f"  # {facts['rows']} rows, {facts['begin_s']:.3f} to {facts['end_s']:.3f} s, {facts['rate_hz'] or 0.0:.2f} Hz",
-        _clock_line(of, span),
+        _clock_line(of, span, base),
     ]
     antenna = of.log.antenna if of.log else None
     if section == "gnss" and antenna is not None:
@@ -398,6 +399,8 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list
         lines.append(_point_line("  antenna_position_m" if section == "gnss" else "  point_m", of))
     if section == "gnss" and track.position_std is None:
         lines.append(f"  position_std_m: [1.5, 1.5, 3.0]  {CHECK} north, east, down; the file has none")
+    if not track.datum_known:
+        lines.append(f"  height: ellipsoidal  {CHECK} the log does not tell what heights are above; else sea-level")
     if track.above_sea:
         lines.append(_height_line())
     return lines
@@ -412,8 +415,10 @@ def _height_line() -> str:
     )
 
 
-def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
+def _clock_line(of: LogSource, span: tuple[float, float], base: Log | None) -> str:
     time = of.rows.time
+    if (apart := _between_clocks(of.log, base)) is not None:
+        return f"  clock_offset_s: {apart!r}  {CHECK} from the clock of one log to that of the other, by UTC"
     if of.log is not None and of.log.fix_age is not None:
         return f"  clock_offset_s: {-of.log.fix_age:g}  {CHECK} how old fixes are when they are stamped, by the log"
     if time[-1] < span[0] or time[0] > span[1]:
@@ -422,6 +427,15 @@ def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
             "brings these to the same clock"
         )
     return f"  clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s"
+
+
+def _between_clocks(of: Log | None, base: Log | None) -> float | None:
+    """Return what brings stamps of a log to the clock of another, s, if they differ and both count from a known UTC."""
+    if of is None or base is None or of.utc_of_zero is None or base.utc_of_zero is None:
+        return None
+    apart = of.utc_of_zero - base.utc_of_zero
+    known = {of.clock, base.clock} <= {"unix", "gps-week"}
+    return apart if known and abs(apart) > 1e-6 else None
 
 
 def _heading_lines(of: LogSource) -> list[str]:
