@@ -272,6 +272,7 @@ def test_headers_of_another_clock_are_brought_to_that_of_the_others(tmp_path: Pa
     assert log.clock == "unix"
     np.testing.assert_allclose(log.imus["/imu"].time, times() + 0.002, atol=1e-6)
     assert log.clock_offsets == {"/imu": pytest.approx(BEGIN - 100.0 + 0.002)}
+    assert any("headers count from elsewhere" in text for text in log.notes)
 
 
 def test_headers_that_all_count_from_elsewhere_stay(tmp_path: Path) -> None:

@@ -165,6 +165,25 @@ def test_utc_of_a_fix(name: str, logs: Path, expected: dict[str, Any]) -> None:
     assert log.utc_of_zero + row[0] == pytest.approx(utc, abs=0.25)
 
 
+def test_positions_computed_afterwards_come_to_the_clock_of_the_log(
+    logs: Path, expected: dict[str, Any], tmp_path: Path
+) -> None:
+    fixes = list(expected["ulog/ekf_failure.ulg"]["gnss"]["vehicle_gps_position[0]"]["sample"].values())
+    header = "%  GPST  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)"
+    rows = []
+    for fix in fixes:
+        week, second = divmod(fix[-1] + 18 - 315964800, 604800)  # 18 leap seconds
+        rows.append(f"{week:.0f} {second:.3f} {fix[1]:.9f} {fix[2]:.9f} {fix[3]:.4f} 1 12 0.01 0.01 0.02")
+    path = tmp_path / "ppk.pos"
+    path.write_text("\n".join([header, *rows]))
+    recording = load_settings(settings_of([logs / "ulog" / "ekf_failure.ulg", path]))
+    assert recording.gnss is not None
+    assert recording.reference is None
+    # fixes are 0.11 s old when they are stamped
+    np.testing.assert_allclose(recording.gnss.time, [fix[0] - 0.11 for fix in fixes], atol=0.1)
+    np.testing.assert_allclose(recording.gnss.position_std, np.tile([0.01, 0.01, 0.02], (3, 1)))
+
+
 def test_the_forward_axis_of_a_robot_on_its_side(logs: Path) -> None:
     assert "axes: [-z, x, -y]" in propose([logs / "rosbag" / "husky.bag"])
 

@@ -64,9 +64,23 @@ def read(path: str | Path) -> Log:
             streams.sensors,
             streams.unusable_ones(),
             utc_of_zero=zero,
-            notes=(*notes, *streams.notes, *(said for topic, one in topics.items() if (said := one.late(topic)))),
+            notes=(
+                *notes,
+                *streams.notes,
+                *_moved(topics),
+                *(said for topic, one in topics.items() if (said := one.late(topic))),
+            ),
             clock_offsets={topic: one.shift for topic, one in topics.items() if one.shift},
         )
+
+
+def _moved(topics: Mapping[str, Topic]) -> tuple[str, ...]:
+    return tuple(
+        f"{name}: headers count from elsewhere; {topic.shift:.3f} s more is the time of recording, which is late by what "
+        "the fastest message took"
+        for name, topic in topics.items()
+        if topic.shift
+    )
 
 
 def _imu_values(message: Any) -> Values:

@@ -14,7 +14,7 @@ from polyins.config import NOISE_GRADES
 from polyins.config.yaml_document import Document, as_document
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats import geoid
+from polyins.formats import geoid, rtklib, table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
@@ -36,6 +36,7 @@ FEWEST_SHAKEN = 100
 MEDIAN_TO_STD = 1.4826
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
+BY_UTC = "by what both files say of UTC; an autopilot knows it to a tenth of a second; time_offset: estimate finds more"
 FORWARD_IS_A_GUESS = "forward is a guess"
 LEAST_SIGMAS = 4.0
 """of what chance makes, by which a horizontal axis agrees with the acceleration of the speed if it is forward"""
@@ -57,6 +58,13 @@ class LogSource:
     stream: str = ""
     """its name, in a log"""
     log: Log | None = None
+
+    @property
+    def utc_of_zero(self) -> float | None:
+        """Unix time at which its stamps are zero, s, where its file tells it; a log gets fixes when they are old."""
+        if self.log is None:
+            return rtklib.utc_of_zero(self.path) or table.utc_of_zero(self.path)
+        return None if self.log.utc_of_zero is None else self.log.utc_of_zero + (self.log.fix_age or 0.0)
 
     @property
     def place(self) -> str:
@@ -84,21 +92,23 @@ def propose(paths: Sequence[str | Path]) -> str:
     lines = [f"# {len(imus)} IMU(s), {len(tracks)} stream(s) of positions. {marked}", *_comments(left_out)]
     lines.append("imus:")
     for number, imu in enumerate(imus, 1):
-        lines += _imu_lines(number, imu, speeds)
+        lines += _imu_lines(number, imu, imus[0], speeds)
     span = (max(one.rows.time[0] for one in imus), min(one.rows.time[-1] for one in imus))
-    # A file with attitude is a reference rather than a receiver's, if there is a choice.
-    tracks.sort(key=lambda one: isinstance(one.rows, Track) and one.rows.attitude is not None)
+    # A file with attitude is a reference rather than a receiver's, and one computed afterwards better than the log's.
+    tracks.sort(key=lambda one: (isinstance(one.rows, Track) and one.rows.attitude is not None, one.log is not None))
     only_solution = len(tracks) == 1 and not tracks[0].log and data_format(tracks[0].path) == "kf-gins-nav"
     sections = ["reference"] if only_solution else ["gnss", "reference"]
+    if len(tracks) > 1 and _is_receiver(tracks[1]):
+        sections = sections[:1]
     for section, track in zip(sections, tracks, strict=False):
-        lines += ["", f"{section}:", *_track_lines(section, track, span)]
+        lines += ["", f"{section}:", *_track_lines(section, track, imus[0], span)]
     lines += [f"{CHECK} {one.place} also holds positions and is not used" for one in tracks[len(sections) :]]
     for heading in headings[:1]:
-        lines += ["", "heading:", *_heading_lines(heading)]
+        lines += ["", "heading:", *_heading_lines(heading, imus[0])]
     for speed in speeds[:1]:
-        lines += ["", "odometer:", *_odometer_lines(speed)]
+        lines += ["", "odometer:", *_odometer_lines(speed, imus[0])]
     for height in _sensors(read, "height")[:1] if "gnss" in sections[: len(tracks)] else []:
-        lines += ["", "height:", *_barometer_lines(height)]
+        lines += ["", "height:", *_barometer_lines(height, imus[0])]
     lines += ["", "start:", _start_line(bool(tracks) and not only_solution, tracks, headings)]
     return "\n".join(lines) + "\n"
 
@@ -163,6 +173,11 @@ def _sources(paths: Sequence[str | Path]) -> tuple[list[LogSource], list[str]]:
     return found, [*left_out, *(f"not used: {error}" for error in refused)]
 
 
+def _is_receiver(of: LogSource) -> bool:
+    """Whether positions are those of a log's receiver, which judge nothing."""
+    return of.log is not None and isinstance(of.rows, Track) and of.rows.attitude is None
+
+
 def _comments(texts: Sequence[str]) -> list[str]:
     """Return what is not used as comments."""
     return [f"{CHECK} {text}" for text in texts]
@@ -183,7 +198,7 @@ def _sensors(read: Sequence[LogSource], kind: str) -> list[LogSource]:
     return [one for one in read if isinstance(one.rows, SensorRows) and one.rows.kind == kind]
 
 
-def _imu_lines(number: int, imu: LogSource, speeds: list[LogSource]) -> list[str]:
+def _imu_lines(number: int, imu: LogSource, first: LogSource, speeds: list[LogSource]) -> list[str]:
     assert isinstance(imu.rows, ImuRows)
     facts = describe(imu.rows)
     lines = [f"  - name: imu{number}", f"    file: {_quoted(imu.path)}", *_format_lines(imu, "    ")]
@@ -192,7 +207,10 @@ def _imu_lines(number: int, imu: LogSource, speeds: list[LogSource]) -> list[str
         rate = (facts["rows"] - 1) / facts["duration_s"]
         repeated = facts["repeated_stamps"]
         lines.append(f"    rate_hz: {rate:.6g}  {CHECK} {repeated} stamp(s) repeat, so rows are counted")
-    if number > 1 and imu.log is None:
+    shift = _shift(imu, first)
+    if shift:
+        lines.append(f"    clock_offset_s: {shift!r}  {CHECK} {BY_UTC}")
+    elif number > 1 and imu.log is None:
         lines.append(f"    clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s")
     return [
         *lines,
@@ -274,24 +292,34 @@ def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, fl
     return best, correlation, correlation * float(np.sqrt(len(gained)))
 
 
-def _place_lines(of: LogSource) -> list[str]:
-    return [f"  file: {_quoted(of.path)}", f"  stream: {_quoted(of.stream)}"]
+def _place_lines(of: LogSource, first: LogSource) -> list[str]:
+    shift = _shift(of, first)
+    clock = [f"  clock_offset_s: {shift!r}  {CHECK} {BY_UTC}"] if shift else []
+    return [f"  file: {_quoted(of.path)}", f"  stream: {_quoted(of.stream)}", *clock]
 
 
-def _odometer_lines(of: LogSource) -> list[str]:
+def _shift(of: LogSource, first: LogSource) -> float | None:
+    """Return what brings stamps to the clock of the first IMU, s, or None where files do not tell."""
+    if of.log is first.log and of.log is not None:
+        return 0.0
+    zero, base = of.utc_of_zero, first.utc_of_zero
+    return None if zero is None or base is None else round(zero - base, 6)
+
+
+def _odometer_lines(of: LogSource, first: LogSource) -> list[str]:
     return [
-        *_place_lines(of),
+        *_place_lines(of, first),
         f"  std_m_s: 0.1  {CHECK} slip is what makes a wheel's speed wrong, not what the log states",
         f"  scale_std: 0.05  {CHECK} of a constant part of its error",
         f"  position_m: [0, 0, 0]  {CHECK} between the wheels: forward, right, down from the array's origin, m",
     ]
 
 
-def _barometer_lines(of: LogSource) -> list[str]:
+def _barometer_lines(of: LogSource, first: LogSource) -> list[str]:
     assert isinstance(of.rows, SensorRows)
     std = f"  std_m: {BAROMETER_STD_M:g}  {CHECK} wind and rotors press on it as well"
     return [
-        *_place_lines(of),
+        *_place_lines(of, first),
         std,
         f"  bias_std_m: {BAROMETER_BIAS_M:g}  {CHECK} by which the weather is off the standard atmosphere, and the sea",
         f"  bias_random_walk_m_sqrt_s: {WEATHER_M_SQRT_S:g}  {CHECK} how fast the weather changes",
@@ -313,7 +341,7 @@ def _format_lines(of: LogSource, indent: str) -> list[str]:
     return lines
 
 
-def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list[str]:
+def _track_lines(section: str, of: LogSource, first: LogSource, span: tuple[float, float]) -> list[str]:
     track = of.rows
     assert isinstance(track, Track)
     facts = describe(track)
@@ -321,7 +349,7 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list
         f"  file: {_quoted(of.path)}",
         *_format_lines(of, "  "),
         f"  # {facts['rows']} rows, {facts['begin_s']:.3f} to {facts['end_s']:.3f} s, {facts['rate_hz'] or 0.0:.2f} Hz",
-        _clock_line(of, span),
+        _clock_line(of, first, span),
     ]
     antenna = of.log.antenna if of.log else None
     if section == "gnss" and antenna is not None:
@@ -345,8 +373,11 @@ def _height_line() -> str:
     )
 
 
-def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
-    time = of.rows.time
+def _clock_line(of: LogSource, first: LogSource, span: tuple[float, float]) -> str:
+    time, shift = of.rows.time, _shift(of, first)
+    if shift:
+        age = of.log.fix_age or 0.0 if of.log else 0.0
+        return f"  clock_offset_s: {round(shift - age, 6)!r}  {CHECK} {BY_UTC}"
     if of.log is not None and of.log.fix_age is not None:
         return f"  clock_offset_s: {-of.log.fix_age:g}  {CHECK} how old fixes are when they are stamped, by the log"
     if time[-1] < span[0] or time[0] > span[1]:
@@ -357,12 +388,12 @@ def _clock_line(of: LogSource, span: tuple[float, float]) -> str:
     return f"  clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s"
 
 
-def _heading_lines(of: LogSource) -> list[str]:
+def _heading_lines(of: LogSource, first: LogSource) -> list[str]:
     assert isinstance(of.rows, SensorRows)
     told = of.rows.std is not None
     how = "or leave it out, to take what the log tells" if told else "the log does not tell how good this heading is"
     return [
-        *_place_lines(of),
+        *_place_lines(of, first),
         f"  std_deg: {HEADING_STD_DEG:g}  {CHECK} {how}",
         f"  offset_std_deg: {HEADING_STD_DEG:g}  {CHECK} of a constant part of its error",
         f"  rate_hz: {HEADING_RATE_HZ:g}  # its errors last",
