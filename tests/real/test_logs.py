@@ -13,10 +13,12 @@ from click.testing import CliRunner
 
 from polyins import cli
 from polyins.errors import InputError
+from polyins.formats import geoid
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, read_log
 from polyins.formats.rows import ImuRows, Track, intervals
 from polyins.formats.rtklib import read_gnss
+from polyins.formats.solution_files import read_solution
 from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG
 from polyins.reading.guess import read_stream
@@ -333,8 +335,8 @@ def test_a_receiver_alone_is_no_recording(logs: Path) -> None:
         propose([logs / "ubx" / "zed-f9r.ubx"])
 
 
-def run(log: Path, out: Path) -> dict[str, Any]:
-    done = CliRunner().invoke(cli.cli, ["run", str(log), "--json", "--no-report", "--out", str(out)])
+def run(log: Path, out: Path, *more: str) -> dict[str, Any]:
+    done = CliRunner().invoke(cli.cli, ["run", str(log), *more, "--json", "--no-report", "--out", str(out)])
     assert done.exit_code == 0, done.output
     found: dict[str, Any] = json.loads(done.stdout)
     return found
@@ -364,7 +366,46 @@ def test_one_command_from_a_log_of_ardupilot_to_a_result(logs: Path, tmp_path: P
     assert summary["imus"] == 2
     assert summary["verdict"]["level"] in ("trust", "doubt")
     assert any("no IMU has data for 627.9 s" in text for text in summary["warnings"])
-    assert any("heights of the solution are above the sea" in text for text in summary["warnings"])
+    grid = geoid.library() is not None
+    assert any("above the sea" in text for text in summary["warnings"])
+    assert summary["heights"] == ("ellipsoidal" if grid else "sea-level")
+    time = read_solution(tmp_path).time
+    assert time[0] < 215.0
+    assert time[-1] > 880.0  # armed again
+    assert not ((time > 252.0) & (time < 879.0)).any()
+
+
+@pytest.mark.parametrize("imu", ["IMU", "IMU2"])
+def test_each_imu_of_a_log_alone_by_its_name_there(imu: str, logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "dataflash" / "log0036.bin", tmp_path, "--imu", imu)
+    assert (summary["method"], summary["imus"]) == ("single", 1)
+    assert "sensor of heading" in summary["start"]["heading"]
+    assert summary["verdict"]["level"] != "do-not-use"
+    assert summary["measurements"]["heading"]["count"] > 100
+
+
+def test_an_unknown_file_among_others_is_named_and_the_rest_is_run(logs: Path, tmp_path: Path) -> None:
+    unknown = str(logs / "cases" / "unknown-binary" / "log.bin")
+    summary = run(logs / "ulog" / "small.ulg", tmp_path, unknown)
+    assert any("no known binary format" in text for text in summary["warnings"])
+    done = CliRunner().invoke(cli.cli, ["info", str(logs / "ulog" / "small.ulg"), unknown, "--json"])
+    assert [one["kind"] for one in json.loads(done.stdout)["files"]] == ["log", "unknown"]
+    assert isinstance(done.exception, InputError)
+
+
+def test_what_rests_without_a_heading_is_refused_with_what_would_help(logs: Path, tmp_path: Path) -> None:
+    log = str(logs / "ubx" / "neo-m8u.ubx")
+    done = CliRunner().invoke(cli.cli, ["run", log, "--no-report", "--out", str(tmp_path)])
+    assert isinstance(done.exception, InputError)
+    assert "start.heading_deg" in str(done.exception)
+    assert "polyins init" in str(done.exception)
+
+
+def test_a_receiver_with_sensors_of_its_own_gives_a_result(logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "ubx" / "neo-m8l.ubx", tmp_path)
+    assert summary["verdict"]["level"] == "doubt"  # of hands nobody knows which way they point
+    assert any("agree with ESF-INS" in text for text in summary["warnings"])
+    assert any("own fusion with its sensors" in text for text in summary["warnings"])
 
 
 @pytest.mark.parametrize(("name", "day"), [("boat", "2018-08-20"), ("m9n", "2020-07-11")])

@@ -76,8 +76,8 @@ def read(path: str | Path) -> Log:
 
 def _moved(topics: Mapping[str, Topic]) -> tuple[str, ...]:
     return tuple(
-        f"{name}: headers count from elsewhere; {topic.shift:.3f} s more is the time of recording, which is late by what "
-        "the fastest message took"
+        f"{name}: headers count from elsewhere; {topic.shift:.3f} s more is the time of recording, late by what the "
+        "fastest message took"
         for name, topic in topics.items()
         if topic.shift
     )
