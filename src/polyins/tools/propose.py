@@ -45,7 +45,7 @@ FEWEST_MEANS = 20
 """of a second, to tell which axis points forward"""
 BAROMETER_STD_M, BAROMETER_BIAS_M, WEATHER_M_SQRT_S = 1.0, 300.0, 0.1
 """noise of a barometer on a vehicle; 35 hPa; 6 m in an hour"""
-HEADING_RATE_HZ = 1.0
+BAROMETER_RATE_HZ = HEADING_RATE_HZ = 1.0
 """errors of another filter last; taken at its own rate they would be averaged away"""
 
 
@@ -345,6 +345,7 @@ def _barometer_lines(of: LogSource, first: LogSource) -> list[str]:
         std,
         f"  bias_std_m: {BAROMETER_BIAS_M:g}  {CHECK} by which the weather is off the standard atmosphere, and the sea",
         f"  bias_random_walk_m_sqrt_s: {WEATHER_M_SQRT_S:g}  {CHECK} how fast the weather changes",
+        f"  rate_hz: {BAROMETER_RATE_HZ:g}  # its errors last",
         f"  position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
     ]
 
