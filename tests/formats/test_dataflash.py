@@ -111,6 +111,13 @@ def test_new_forms_tell_instances_by_a_number(tmp_path: Path) -> None:
     assert log.utc_of_zero == pytest.approx(utc - 10.0, abs=1e-3)
 
 
+def test_a_week_before_there_is_a_fix_tells_no_utc(tmp_path: Path) -> None:
+    place = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1]
+    early: Message = ("GPS", NEW_GPS, [9.9e6, 0, 1, 1e3 * SECOND, WEEK + 1024, 0, 99.0, *place])
+    with_it = read(dataflash(tmp_path / "a.bin", [early, *new_forms(20)]))
+    assert with_it.utc_of_zero == read(dataflash(tmp_path / "b.bin", new_forms(20))).utc_of_zero
+
+
 def old_forms(begin: float, count: int = 50) -> list[Message]:
     found: list[Message] = []
     for k, t in enumerate(stamps(count, begin=begin)):

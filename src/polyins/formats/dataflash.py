@@ -16,7 +16,7 @@ import numpy as np
 
 from polyins.files import find
 from polyins.formats.gps_time import utc_of_week
-from polyins.formats.log import Log, counted, damage_named, needed, rates_to_rows, rising
+from polyins.formats.log import Log, counted, damage_named, fastest, needed, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -166,15 +166,15 @@ def _headings(path: Path, tables: dict[str, Table]) -> dict[str, SensorRows]:
 
 
 def _utc_of_zero(tables: dict[str, Table]) -> float | None:
-    """Return Unix time less time since boot, the most there is: a fix is stamped late, never early."""
+    """Return Unix time less time since boot."""
     fixes = next((tables[name] for name in sorted(tables) if name.startswith("GPS")), None)
     if fixes is None or "GWk" not in fixes:
         return None
-    known = fixes["GWk"] > 0.0
+    known = (fixes["GWk"] > 0.0) & (fixes["Status"] >= THREE_DIMENSIONS)
     if not known.any():
         return None
     utc = utc_of_week(fixes["GWk"][known], fixes["GMS"][known] * 1e-3)
-    return float(np.max(utc - fixes["TimeUS"][known] * 1e-6))
+    return fastest(utc - fixes["TimeUS"][known] * 1e-6)
 
 
 def _antenna(parameters: dict[str, float]) -> tuple[float, float, float] | None:

@@ -111,6 +111,11 @@ def counted(kinds: Iterable[Any], name_of: Callable[[Any], str]) -> dict[str, in
     return found
 
 
+def fastest(apart: Array) -> float:
+    """Return the most of UTC less stamps, s: a fix is stamped late, never early; one a second off tells no UTC yet."""
+    return float(apart[np.abs(apart - np.median(apart)) < 1.0].max())
+
+
 def rising(time: Array) -> NDArray[np.intp]:
     """Return the rows whose stamp is above all before it, shape (K,)."""
     before = np.concatenate([[-np.inf], np.maximum.accumulate(time)[:-1]])

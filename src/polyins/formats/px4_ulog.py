@@ -14,7 +14,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats.log import Log, counted, damage_named, needed, rates_to_rows, rising
+from polyins.formats.log import Log, counted, damage_named, fastest, needed, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.model.attitude import euler_angles
 from polyins.model.recording import Array
@@ -174,12 +174,12 @@ def _headings(path: Path, topics: dict[str, dict[int, Topic]]) -> dict[str, Sens
 
 
 def _utc_of_zero(topics: dict[str, dict[int, Topic]]) -> float | None:
-    """Return Unix time less time since boot, the most there is: a fix is stamped late, never early."""
+    """Return Unix time less time since boot."""
     for topic in (topic for kind in RECEIVERS for topic in topics[kind].values()):
         known = (topic["time_utc_usec"] > 0) & (topic["fix_type"] >= THREE_DIMENSIONS)
         if known.any():
             apart = topic["time_utc_usec"][known].astype(float) - topic["timestamp"][known].astype(float)
-            return float(np.max(apart)) * 1e-6
+            return fastest(apart * 1e-6)
     return None
 
 
