@@ -48,6 +48,11 @@ def read(path: str | Path) -> Log:
         places, headings = _places(found, topics), _headings(found, topics)
         unusable |= dict.fromkeys(list(tracks)[1:], f"{next(iter(tracks), '')} is the receiver that PX4 used")
         unusable |= {name: "PX4's own estimate, on a plane" for name in places if TRUE_PLACE not in name}
+        unusable |= {
+            name: "the truth of a simulation, whose heights were not logged"
+            for name in places
+            if TRUE_PLACE in name and not places[name].position[:, 2].any()
+        }
         unusable |= dict.fromkeys((name for name in headings if "truth" in name), "the truth of a simulation")
         known = log.initial_parameters
         return Log(
