@@ -71,15 +71,17 @@ def needed(module: str, extra: str, path: str | Path, use: str = "read") -> Any:
 
 
 @contextmanager
-def damage_named(path: Path, what: str) -> Iterator[None]:
-    """Turn what a library raises over a damaged file into an InputError."""
+def damage_named(path: Path, what: str, remedy: str = "") -> Iterator[None]:
+    """Turn what a library raises over a damaged file into an InputError; `remedy`: what could mend it."""
     try:
         yield
     except InputError:
         raise
     except Exception as error:  # libraries raise whatever they stumble over
         reason = str(error).strip() or type(error).__name__
-        raise InputError(f"{path}: cannot be read as {what} ({reason.splitlines()[0]}); is it damaged?") from error
+        raise InputError(
+            f"{path}: cannot be read as {what} ({reason.splitlines()[0]}); is it damaged?{remedy}"
+        ) from error
 
 
 def rates_to_rows(path: Path, name: str, time: Array, gyro: Array, force: Array) -> ImuRows:

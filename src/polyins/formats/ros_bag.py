@@ -38,6 +38,12 @@ OWN_PACKAGES = (
     "shape_msgs", "std_msgs", "stereo_msgs", "tf2_msgs", "trajectory_msgs", "visualization_msgs",
 )  # fmt: skip
 """whose other messages hold nothing to navigate with"""
+MENDED = {
+    ".bag": " rosbag reindex mends one whose end is missing",
+    ".mcap": " mcap recover mends one whose end is missing",
+    ".db3": " sqlite3 FILE .recover mends one whose end is missing",
+}
+"""by suffix, the tools that people have"""
 SAME_CLOCK_S = 10.0
 """by which a header's stamp may be off the time of recording, if both are Unix time"""
 
@@ -46,7 +52,7 @@ def read(path: str | Path) -> Log:
     """Read the streams; raises InputError for a damaged file, none of these messages, or without rosbags."""
     found = find(path)
     highlevel, types = needed("rosbags.highlevel", "ros", found), needed("rosbags.typesys", "ros", found)
-    with damage_named(found, "a ROS bag"):
+    with damage_named(found, "a ROS bag", MENDED.get(found.suffix, "")):
         known = types.get_typestore(types.Stores.LATEST)
         with highlevel.AnyReader([found], default_typestore=known) as bag:
             topics, notes = _topics(bag)
