@@ -150,3 +150,16 @@ def test_a_torn_end_costs_its_last_message(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-60])
     log = read(path)
     assert 48 <= len(log.imus["IMU2"].time) < 50
+
+
+def test_damage_on_the_way_is_told_and_nothing_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = dataflash(tmp_path / "a.bin", old_forms(10.0, count=400))
+    whole = read(path)
+    assert whole.notes == ()
+    content = bytearray(path.read_bytes())
+    content[9000:9700] = b"\x55" * 700
+    path.write_bytes(content)
+    log = read(path)
+    assert 370 < len(log.imus["IMU"].time) < 400
+    assert "bytes on the way are no messages" in log.notes[0]
+    assert capsys.readouterr().out == ""

@@ -149,6 +149,17 @@ def test_a_torn_end_costs_its_last_message(tmp_path: Path) -> None:
     assert len(read(path).imus["vehicle_imu[0]"].time) == 399
 
 
+def test_a_topic_that_nobody_announced_is_a_note_and_nothing_is_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = ulog(tmp_path / "a.ulg", {("vehicle_imu", 0): (VEHICLE_IMU, increments(FULL))})
+    path.write_bytes(path.read_bytes() + message("D", struct.pack("<HQ", 7, 3_000_000)))
+    log = read(path)
+    assert len(log.imus["vehicle_imu[0]"].time) == 400
+    assert any("its library says" in text and "7" in text for text in log.notes)
+    assert capsys.readouterr() == ("", "")
+
+
 def test_dropouts_are_told(tmp_path: Path) -> None:
     path = ulog(tmp_path / "a.ulg", {("vehicle_imu", 0): (VEHICLE_IMU, increments(FULL))})
     path.write_bytes(path.read_bytes() + message("O", struct.pack("<H", 250)))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field, replace
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -89,6 +90,19 @@ def rates_to_rows(path: Path, name: str, time: Array, gyro: Array, force: Array)
     steps = intervals(time)[:, None]
     source = RowSource(f"{path}, {name}")
     return ImuRows(source, time, gyro * steps, force * steps, gyro_unit="rad/s", accel_unit="m/s^2")
+
+
+@contextmanager
+def heard() -> Iterator[list[str]]:
+    """Give a list that what a library prints inside becomes one note of: standard output is not the library's."""
+    notes: list[str] = []
+    said = StringIO()
+    with redirect_stdout(said), redirect_stderr(said):
+        yield notes
+    lines = list(dict.fromkeys(line.strip() for line in said.getvalue().splitlines() if line.strip()))
+    if lines:
+        more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+        notes.append(f"its library says: {lines[0]}{more}")
 
 
 def joined_rates(path: Path, name: str, gyro: Array, force: Array) -> ImuRows:

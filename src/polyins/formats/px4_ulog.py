@@ -14,7 +14,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats.log import Log, counted, damage_named, fastest, needed, rates_to_rows, rising
+from polyins.formats.log import Log, counted, damage_named, fastest, heard, needed, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.model.attitude import euler_angles
 from polyins.model.recording import Array
@@ -41,7 +41,8 @@ def read(path: str | Path) -> Log:
     found = find(path)
     library = needed("pyulog", "px4", found)
     with damage_named(found, "PX4 ULog"):
-        log = library.ULog(str(found), list(TOPICS), disable_str_exceptions=True)
+        with heard() as said:
+            log = library.ULog(str(found), list(TOPICS), disable_str_exceptions=True)
         topics = {name: {one.multi_id: one.data for one in log.data_list if one.name == name} for name in TOPICS}
         imus, unusable = _imus(found, topics)
         tracks = _tracks(found, topics)
@@ -65,8 +66,9 @@ def read(path: str | Path) -> Log:
             upright=True,
             fix_age=known["EKF2_GPS_DELAY"] * 1e-3 if "EKF2_GPS_DELAY" in known else None,
             antenna=_antenna(known),
-            notes=tuple(
-                f"nothing logged for {one.duration} ms at {one.timestamp * 1e-6:.3f} s" for one in log.dropouts
+            notes=(
+                *said,
+                *(f"nothing logged for {one.duration} ms at {one.timestamp * 1e-6:.3f} s" for one in log.dropouts),
             ),
         )
 
