@@ -112,7 +112,7 @@ def demo(out: Path) -> None:
     default=None,
     help="A row of the method table; unless given enav-fusion, single with one IMU, or what the wheels allow.",
 )
-@click.option("--imu", default=None, help="The IMU that `single` uses, by name; the first unless given.")
+@click.option("--imu", default=None, help="The IMU that `single` uses, by name or stream; the first unless given.")
 @out_option("polyins-out")
 @as_json_option
 @no_report_option
@@ -122,6 +122,7 @@ def run(
     """Run one method over one recording: a configuration (polyins, KF-GINS, Wheel-INS), or the logs that hold it."""
     from polyins.model.methods import find_method
     from polyins.tools import navigation, results
+    from polyins.tools.propose import way_named
 
     gc.set_threshold(COLLECT_AFTER)
     if method is not None:
@@ -129,14 +130,16 @@ def run(
     if imu is not None and method not in (None, "single"):
         raise InputError(f"--imu {imu}: given with --method {method}; expected it with single only")
     with progress("reading"):
-        recording = _open(_settings(inputs))
+        settings = _settings(inputs)
+        recording = _open(settings)
     known = navigation.head(recording)
     if imu is not None and known.rig.has_wheels:
         raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
     name = method or _usual_method(known, imu)
-    index = _imu_index([one.name for one in known.rig.imus], imu)
+    streams = {entry.stream: entry.name for entry in settings[0].imus if entry.stream}
+    index = _imu_index([one.name for one in known.rig.imus], streams.get(imu or "", imu))
     make_folder(out)
-    with compilation_said(), progress(name) as update:
+    with way_named(inputs), compilation_said(), progress(name) as update:
         outcome = navigation.run(recording, name, imu=index, folders={out: None}, progress=update)
     with progress("writing"):
         results.write_run(out, recording, outcome, report=not no_report)
@@ -534,13 +537,16 @@ def dataset_configuration(name: str, gnss: bool) -> None:
 @as_json_option
 def info(files: tuple[Path, ...], as_json: bool) -> None:
     """Say what is in data files or configurations: streams, rates, gaps, span."""
-    from polyins.tools.inspect import inspect, listing
+    from polyins.tools.inspect import inspect, inspect_each, listing
 
-    facts = inspect(files[0]) if len(files) == 1 else {"files": [inspect(file) for file in files]}
+    facts = inspect(files[0]) if len(files) == 1 else {"files": inspect_each(files)}
     if as_json:
         _print_json(facts)
     else:
         click.echo(listing(facts))
+    unread = [one for one in facts.get("files", ()) if one["kind"] == "unknown"]
+    if unread:
+        raise InputError("; ".join(text for one in unread for text in one["problems"]))
 
 
 @cli.command()

@@ -111,6 +111,13 @@ def test_new_forms_tell_instances_by_a_number(tmp_path: Path) -> None:
     assert log.utc_of_zero == pytest.approx(utc - 10.0, abs=1e-3)
 
 
+def test_a_week_before_there_is_a_fix_tells_no_utc(tmp_path: Path) -> None:
+    place = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1]
+    early: Message = ("GPS", NEW_GPS, [9.9e6, 0, 1, 1e3 * SECOND, WEEK + 1024, 0, 99.0, *place])
+    with_it = read(dataflash(tmp_path / "a.bin", [early, *new_forms(20)]))
+    assert with_it.utc_of_zero == read(dataflash(tmp_path / "b.bin", new_forms(20))).utc_of_zero
+
+
 def old_forms(begin: float, count: int = 50) -> list[Message]:
     found: list[Message] = []
     for k, t in enumerate(stamps(count, begin=begin)):
@@ -143,3 +150,16 @@ def test_a_torn_end_costs_its_last_message(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-60])
     log = read(path)
     assert 48 <= len(log.imus["IMU2"].time) < 50
+
+
+def test_damage_on_the_way_is_told_and_nothing_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = dataflash(tmp_path / "a.bin", old_forms(10.0, count=400))
+    whole = read(path)
+    assert whole.notes == ()
+    content = bytearray(path.read_bytes())
+    content[9000:9700] = b"\x55" * 700
+    path.write_bytes(content)
+    log = read(path)
+    assert 370 < len(log.imus["IMU"].time) < 400
+    assert "bytes on the way are no messages" in log.notes[0]
+    assert capsys.readouterr().out == ""

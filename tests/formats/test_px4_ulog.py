@@ -123,10 +123,41 @@ def test_of_two_receivers_one_is_used_and_fixes_in_two_dimensions_are_not(tmp_pa
     assert log.utc_of_zero == pytest.approx(UTC - 0.12)
 
 
+TRUE_PLACE = "uint64_t timestamp;double lat;double lon;float alt;float alt_ellipsoid;"
+TRUE_ATTITUDE = "uint64_t timestamp;float[4] q;"
+
+
+@pytest.mark.parametrize("height", [500.0, 0.0])
+def test_the_truth_of_a_simulation_is_a_reference_if_it_has_heights(height: float, tmp_path: Path) -> None:
+    half = 15.0 * DEG
+    topics = {
+        ("vehicle_imu", 0): (VEHICLE_IMU, increments(FULL)),
+        ("vehicle_global_position_groundtruth", 0): (TRUE_PLACE, [[t, 48.0, 11.0, 454.0, height] for t in FULL[5::20]]),
+        ("vehicle_attitude_groundtruth", 0): (TRUE_ATTITUDE, [[t, [np.cos(half), 0, 0, np.sin(half)]] for t in FULL]),
+    }
+    log = read(ulog(tmp_path / "a.ulg", topics))
+    name = "vehicle_global_position_groundtruth[0]"
+    assert (name in log.unusable) == (height == 0.0)
+    np.testing.assert_allclose(log.tracks[name].attitude, np.tile([0.0, 0.0, 30.0 * DEG], (20, 1)), atol=1e-6)
+    np.testing.assert_allclose(log.tracks[name].position[:, 2], height)
+    assert "vehicle_attitude_groundtruth[0]" in log.unusable
+
+
 def test_a_torn_end_costs_its_last_message(tmp_path: Path) -> None:
     path = ulog(tmp_path / "a.ulg", {("vehicle_imu", 0): (VEHICLE_IMU, increments(FULL))})
     path.write_bytes(path.read_bytes()[:-20])
     assert len(read(path).imus["vehicle_imu[0]"].time) == 399
+
+
+def test_a_topic_that_nobody_announced_is_a_note_and_nothing_is_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = ulog(tmp_path / "a.ulg", {("vehicle_imu", 0): (VEHICLE_IMU, increments(FULL))})
+    path.write_bytes(path.read_bytes() + message("D", struct.pack("<HQ", 7, 3_000_000)))
+    log = read(path)
+    assert len(log.imus["vehicle_imu[0]"].time) == 400
+    assert any("its library says" in text and "7" in text for text in log.notes)
+    assert capsys.readouterr() == ("", "")
 
 
 def test_dropouts_are_told(tmp_path: Path) -> None:

@@ -205,3 +205,17 @@ def test_sentences_come_out_on_the_clock_of_the_messages(tmp_path: Path) -> None
     assert "NAV-PVT is of the same receiver" in log.unusable["GGA"]
     alone = read(write(tmp_path / "b.ubx", zda + b"".join(gga(k) for k in range(6)) + ins(1.0, [0, 0, 0])))
     assert (alone.clock, len(alone.tracks["GGA"].time)) == ("unix", 6)
+
+
+def test_a_time_that_the_receiver_had_not_yet_does_not_count(tmp_path: Path) -> None:
+    early = b"".join(pvt(500.0 + k, fixType=0, gnssFixOk=0) for k in range(3))
+    right = read(write(tmp_path / "a.ubx", drive()))
+    wrong = read(write(tmp_path / "b.ubx", early + drive()))
+    assert wrong.clock_offsets["ESF-MEAS"] == pytest.approx(right.clock_offsets["ESF-MEAS"], abs=0.05)
+
+
+def test_a_sensor_whose_clock_begins_anew_is_named(tmp_path: Path) -> None:
+    again = b"".join(gyro(1.0 + 0.1 * k, [1, 2, 3]) + accel(1.0 + 0.1 * k, [0, 0, 9.8]) for k in range(30))
+    log = read(write(tmp_path / "a.ubx", drive() + again))
+    assert len(log.imus["ESF-MEAS"].time) == 400
+    assert any("began anew" in text for text in log.notes)

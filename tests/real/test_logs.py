@@ -15,10 +15,12 @@ from click.testing import CliRunner
 
 from polyins import cli
 from polyins.errors import InputError
+from polyins.formats import geoid
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, read_log
 from polyins.formats.rows import ImuRows, Track, intervals
 from polyins.formats.rtklib import read_gnss
+from polyins.formats.solution_files import read_solution
 from polyins.model.axes import axes_matrix
 from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG
@@ -166,6 +168,25 @@ def test_utc_of_a_fix(name: str, logs: Path, expected: dict[str, Any]) -> None:
     utc = row[-1] if "ulog" in name else 315964800 + row[-2] * 604800 + row[-1] - 17
     assert log.utc_of_zero is not None
     assert log.utc_of_zero + row[0] == pytest.approx(utc, abs=0.25)
+
+
+def test_positions_computed_afterwards_come_to_the_clock_of_the_log(
+    logs: Path, expected: dict[str, Any], tmp_path: Path
+) -> None:
+    fixes = list(expected["ulog/ekf_failure.ulg"]["gnss"]["vehicle_gps_position[0]"]["sample"].values())
+    header = "%  GPST  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)"
+    rows = []
+    for fix in fixes:
+        week, second = divmod(fix[-1] + 18 - 315964800, 604800)  # 18 leap seconds
+        rows.append(f"{week:.0f} {second:.3f} {fix[1]:.9f} {fix[2]:.9f} {fix[3]:.4f} 1 12 0.01 0.01 0.02")
+    path = tmp_path / "ppk.pos"
+    path.write_text("\n".join([header, *rows]))
+    recording = load_settings(settings_of([logs / "ulog" / "ekf_failure.ulg", path]))
+    assert recording.gnss is not None
+    assert recording.reference is None
+    # fixes are 0.11 s old when they are stamped
+    np.testing.assert_allclose(recording.gnss.time, [fix[0] - 0.11 for fix in fixes], atol=0.1)
+    np.testing.assert_allclose(recording.gnss.position_std, np.tile([0.01, 0.01, 0.02], (3, 1)))
 
 
 def test_the_forward_axis_of_a_robot_on_its_side(logs: Path) -> None:
@@ -391,8 +412,8 @@ def test_a_receiver_alone_is_no_recording(logs: Path) -> None:
         propose([logs / "ubx" / "zed-f9r.ubx"])
 
 
-def run(log: Path, out: Path) -> dict[str, Any]:
-    done = CliRunner().invoke(cli.cli, ["run", str(log), "--json", "--no-report", "--out", str(out)])
+def run(log: Path, out: Path, *more: str) -> dict[str, Any]:
+    done = CliRunner().invoke(cli.cli, ["run", str(log), *more, "--json", "--no-report", "--out", str(out)])
     assert done.exit_code == 0, done.output
     found: dict[str, Any] = json.loads(done.stdout)
     return found
@@ -422,7 +443,46 @@ def test_one_command_from_a_log_of_ardupilot_to_a_result(logs: Path, tmp_path: P
     assert summary["imus"] == 2
     assert summary["verdict"]["level"] in ("trust", "doubt")
     assert any("no IMU has data for 627.9 s" in text for text in summary["warnings"])
-    assert any("heights of the solution are above the sea" in text for text in summary["warnings"])
+    grid = geoid.library() is not None
+    assert any("above the sea" in text for text in summary["warnings"])
+    assert summary["heights"] == ("ellipsoidal" if grid else "sea-level")
+    time = read_solution(tmp_path).time
+    assert time[0] < 215.0
+    assert time[-1] > 880.0  # armed again
+    assert not ((time > 252.0) & (time < 879.0)).any()
+
+
+@pytest.mark.parametrize("imu", ["IMU", "IMU2"])
+def test_each_imu_of_a_log_alone_by_its_name_there(imu: str, logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "dataflash" / "log0036.bin", tmp_path, "--imu", imu)
+    assert (summary["method"], summary["imus"]) == ("single", 1)
+    assert "sensor of heading" in summary["start"]["heading"]
+    assert summary["verdict"]["level"] != "do-not-use"
+    assert summary["measurements"]["heading"]["count"] > 100
+
+
+def test_an_unknown_file_among_others_is_named_and_the_rest_is_run(logs: Path, tmp_path: Path) -> None:
+    unknown = str(logs / "cases" / "unknown-binary" / "log.bin")
+    summary = run(logs / "ulog" / "small.ulg", tmp_path, unknown)
+    assert any("no known binary format" in text for text in summary["warnings"])
+    done = CliRunner().invoke(cli.cli, ["info", str(logs / "ulog" / "small.ulg"), unknown, "--json"])
+    assert [one["kind"] for one in json.loads(done.stdout)["files"]] == ["log", "unknown"]
+    assert isinstance(done.exception, InputError)
+
+
+def test_what_rests_without_a_heading_is_refused_with_what_would_help(logs: Path, tmp_path: Path) -> None:
+    log = str(logs / "ubx" / "neo-m8u.ubx")
+    done = CliRunner().invoke(cli.cli, ["run", log, "--no-report", "--out", str(tmp_path)])
+    assert isinstance(done.exception, InputError)
+    assert "start.heading_deg" in str(done.exception)
+    assert "polyins init" in str(done.exception)
+
+
+def test_a_receiver_with_sensors_of_its_own_gives_a_result(logs: Path, tmp_path: Path) -> None:
+    summary = run(logs / "ubx" / "neo-m8l.ubx", tmp_path)
+    assert summary["verdict"]["level"] == "doubt"  # of hands nobody knows which way they point
+    assert any("agree with ESF-INS" in text for text in summary["warnings"])
+    assert any("own fusion with its sensors" in text for text in summary["warnings"])
 
 
 @pytest.mark.parametrize(("name", "day"), [("boat", "2018-08-20"), ("m9n", "2020-07-11")])

@@ -16,7 +16,7 @@ import numpy as np
 
 from polyins.files import find
 from polyins.formats.gps_time import utc_of_week
-from polyins.formats.log import Log, counted, damage_named, needed, rates_to_rows, rising
+from polyins.formats.log import Log, counted, damage_named, fastest, heard, needed, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -26,6 +26,8 @@ FILTERS = ("NKF1", "NKF6", "XKF1", "XKF6")
 """messages of the autopilot's own filters: EKF2 and EKF3, first and second core, or with a number `C`"""
 KINDS = (*IMU_MESSAGES, "GPS", "GPS2", "GPA", "GPA2", "ATT", "PARM", *FILTERS)
 THREE_DIMENSIONS = 3
+TAIL_BYTES = 528
+"""that may follow the last message: logs of old boards are made of pages"""
 FIXES = {0: "none", 1: "none", 2: "2D", 3: "3D", 4: "DGPS", 5: "float", 6: "fix"}
 
 Table = dict[str, Array]
@@ -36,7 +38,10 @@ def read(path: str | Path) -> Log:
     found = find(path)
     library = needed("pymavlink.DFReader", "ardupilot", found)
     with damage_named(found, "ArduPilot DataFlash"):
-        tables, parameters = _tables(library.DFReader_binary(str(found)))
+        with heard():
+            reader = library.DFReader_binary(str(found))
+            lost = _no_messages(reader)
+            tables, parameters = _tables(reader)
         imus = _imus(found, tables)
         tracks, estimates = _tracks(found, tables), _estimates(found, tables)
         return Log(
@@ -50,7 +55,14 @@ def read(path: str | Path) -> Log:
             upright=True,
             fix_age=parameters["GPS_DELAY_MS"] * 1e-3 if parameters.get("GPS_DELAY_MS") else None,
             antenna=_antenna(parameters),
+            notes=(f"{lost} bytes on the way are no messages and are left out",) if lost > TAIL_BYTES else (),
         )
+
+
+def _no_messages(reader: Any) -> int:
+    """Return how many bytes of a log belong to no message."""
+    known = sum(count * reader.formats[kind].len for kind, count in enumerate(reader.counts) if kind in reader.formats)
+    return int(reader.data_len) - int(known)
 
 
 def _tables(reader: Any) -> tuple[dict[str, Table], dict[str, float]]:
@@ -166,15 +178,15 @@ def _headings(path: Path, tables: dict[str, Table]) -> dict[str, SensorRows]:
 
 
 def _utc_of_zero(tables: dict[str, Table]) -> float | None:
-    """Return Unix time less time since boot, the most there is: a fix is stamped late, never early."""
+    """Return Unix time less time since boot."""
     fixes = next((tables[name] for name in sorted(tables) if name.startswith("GPS")), None)
     if fixes is None or "GWk" not in fixes:
         return None
-    known = fixes["GWk"] > 0.0
+    known = (fixes["GWk"] > 0.0) & (fixes["Status"] >= THREE_DIMENSIONS)
     if not known.any():
         return None
     utc = utc_of_week(fixes["GWk"][known], fixes["GMS"][known] * 1e-3)
-    return float(np.max(utc - fixes["TimeUS"][known] * 1e-6))
+    return fastest(utc - fixes["TimeUS"][known] * 1e-6)
 
 
 def _antenna(parameters: dict[str, float]) -> tuple[float, float, float] | None:

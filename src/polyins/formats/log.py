@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field, replace
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -82,15 +83,17 @@ def needed(module: str, extra: str, path: str | Path, use: str = "read") -> Any:
 
 
 @contextmanager
-def damage_named(path: Path, what: str) -> Iterator[None]:
-    """Turn what a library raises over a damaged file into an InputError."""
+def damage_named(path: Path, what: str, remedy: str = "") -> Iterator[None]:
+    """Turn what a library raises over a damaged file into an InputError; `remedy`: what could mend it."""
     try:
         yield
     except InputError:
         raise
     except Exception as error:  # libraries raise whatever they stumble over
         reason = str(error).strip() or type(error).__name__
-        raise InputError(f"{path}: cannot be read as {what} ({reason.splitlines()[0]}); is it damaged?") from error
+        raise InputError(
+            f"{path}: cannot be read as {what} ({reason.splitlines()[0]}); is it damaged?{remedy}"
+        ) from error
 
 
 def rates_to_rows(path: Path, name: str, time: Array, gyro: Array, force: Array) -> ImuRows:
@@ -98,6 +101,19 @@ def rates_to_rows(path: Path, name: str, time: Array, gyro: Array, force: Array)
     steps = intervals(time)[:, None]
     source = RowSource(f"{path}, {name}")
     return ImuRows(source, time, gyro * steps, force * steps, gyro_unit="rad/s", accel_unit="m/s^2")
+
+
+@contextmanager
+def heard() -> Iterator[list[str]]:
+    """Give a list that what a library prints inside becomes one note of: standard output is not the library's."""
+    notes: list[str] = []
+    said = StringIO()
+    with redirect_stdout(said), redirect_stderr(said):
+        yield notes
+    lines = list(dict.fromkeys(line.strip() for line in said.getvalue().splitlines() if line.strip()))
+    if lines:
+        more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+        notes.append(f"its library says: {lines[0]}{more}")
 
 
 def joined_rates(path: Path, name: str, gyro: Array, force: Array) -> ImuRows:
@@ -120,6 +136,11 @@ def counted(kinds: Iterable[Any], name_of: Callable[[Any], str]) -> dict[str, in
     for value, count in zip(values, counts, strict=True):
         found[name_of(value)] = found.get(name_of(value), 0) + int(count)
     return found
+
+
+def fastest(apart: Array) -> float:
+    """Return the most of UTC less stamps, s: a fix is stamped late, never early; one a second off tells no UTC yet."""
+    return float(apart[np.abs(apart - np.median(apart)) < 1.0].max())
 
 
 def rising(time: Array) -> NDArray[np.intp]:

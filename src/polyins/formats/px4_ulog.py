@@ -14,7 +14,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats.log import Log, counted, damage_named, needed, rates_to_rows, rising
+from polyins.formats.log import Log, counted, damage_named, fastest, heard, needed, rates_to_rows, rising
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.model.attitude import euler_angles
 from polyins.model.recording import Array
@@ -41,13 +41,19 @@ def read(path: str | Path) -> Log:
     found = find(path)
     library = needed("pyulog", "px4", found)
     with damage_named(found, "PX4 ULog"):
-        log = library.ULog(str(found), list(TOPICS), disable_str_exceptions=True)
+        with heard() as said:
+            log = library.ULog(str(found), list(TOPICS), disable_str_exceptions=True)
         topics = {name: {one.multi_id: one.data for one in log.data_list if one.name == name} for name in TOPICS}
         imus, unusable = _imus(found, topics)
         tracks = _tracks(found, topics)
         places, headings = _places(found, topics), _headings(found, topics)
         unusable |= dict.fromkeys(list(tracks)[1:], f"{next(iter(tracks), '')} is the receiver that PX4 used")
         unusable |= {name: "PX4's own estimate, on a plane" for name in places if TRUE_PLACE not in name}
+        unusable |= {
+            name: "the truth of a simulation, whose heights were not logged"
+            for name in places
+            if TRUE_PLACE in name and not places[name].position[:, 2].any()
+        }
         unusable |= dict.fromkeys((name for name in headings if "truth" in name), "the truth of a simulation")
         known = log.initial_parameters
         return Log(
@@ -60,8 +66,9 @@ def read(path: str | Path) -> Log:
             upright=True,
             fix_age=known["EKF2_GPS_DELAY"] * 1e-3 if "EKF2_GPS_DELAY" in known else None,
             antenna=_antenna(known),
-            notes=tuple(
-                f"nothing logged for {one.duration} ms at {one.timestamp * 1e-6:.3f} s" for one in log.dropouts
+            notes=(
+                *said,
+                *(f"nothing logged for {one.duration} ms at {one.timestamp * 1e-6:.3f} s" for one in log.dropouts),
             ),
         )
 
@@ -174,12 +181,12 @@ def _headings(path: Path, topics: dict[str, dict[int, Topic]]) -> dict[str, Sens
 
 
 def _utc_of_zero(topics: dict[str, dict[int, Topic]]) -> float | None:
-    """Return Unix time less time since boot, the most there is: a fix is stamped late, never early."""
+    """Return Unix time less time since boot."""
     for topic in (topic for kind in RECEIVERS for topic in topics[kind].values()):
         known = (topic["time_utc_usec"] > 0) & (topic["fix_type"] >= THREE_DIMENSIONS)
         if known.any():
             apart = topic["time_utc_usec"][known].astype(float) - topic["timestamp"][known].astype(float)
-            return float(np.max(apart)) * 1e-6
+            return fastest(apart * 1e-6)
     return None
 
 

@@ -153,7 +153,7 @@ def read_log(path: str | Path) -> Log:
     return _read_log(found, *bundle.state(found))
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=8)
 def _read_log(path: Path, _changed: int, _size: int) -> Log:
     """Read a log once for all of its streams, as long as the file stays the same."""
     known = log_format(path)

@@ -38,6 +38,12 @@ OWN_PACKAGES = (
     "shape_msgs", "std_msgs", "stereo_msgs", "tf2_msgs", "trajectory_msgs", "visualization_msgs",
 )  # fmt: skip
 """whose other messages hold nothing to navigate with"""
+MENDED = {
+    ".bag": " rosbag reindex mends one whose end is missing",
+    ".mcap": " mcap recover mends one whose end is missing",
+    ".db3": " sqlite3 FILE .recover mends one whose end is missing",
+}
+"""by suffix, the tools that people have"""
 SAME_CLOCK_S = 10.0
 """by which a header's stamp may be off the time of recording, if both are Unix time"""
 
@@ -46,7 +52,7 @@ def read(path: str | Path) -> Log:
     """Read the streams; raises InputError for a damaged file, none of these messages, or without rosbags."""
     found = find(path)
     highlevel, types = needed("rosbags.highlevel", "ros", found), needed("rosbags.typesys", "ros", found)
-    with damage_named(found, "a ROS bag"):
+    with damage_named(found, "a ROS bag", MENDED.get(found.suffix, "")):
         known = types.get_typestore(types.Stores.LATEST)
         with highlevel.AnyReader([found], default_typestore=known) as bag:
             topics, notes = _topics(bag)
@@ -64,9 +70,23 @@ def read(path: str | Path) -> Log:
             streams.sensors,
             streams.unusable_ones(),
             utc_of_zero=zero,
-            notes=(*notes, *streams.notes, *(said for topic, one in topics.items() if (said := one.late(topic)))),
+            notes=(
+                *notes,
+                *streams.notes,
+                *_moved(topics),
+                *(said for topic, one in topics.items() if (said := one.late(topic))),
+            ),
             clock_offsets={topic: one.shift for topic, one in topics.items() if one.shift},
         )
+
+
+def _moved(topics: Mapping[str, Topic]) -> tuple[str, ...]:
+    return tuple(
+        f"{name}: headers count from elsewhere; {topic.shift:.3f} s more is the time of recording, late by what the "
+        "fastest message took"
+        for name, topic in topics.items()
+        if topic.shift
+    )
 
 
 def _imu_values(message: Any) -> Values:

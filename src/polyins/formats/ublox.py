@@ -45,11 +45,16 @@ SHORT = 64
 """bytes up to which a checksum is quicker in plain Python"""
 
 Messages = Sequence[Any]
-_TIME_AT = {
-    (1, 0x07): 0, (1, 0x14): 4, (1, 0x17): 0, (1, 0x05): 0, (1, 0x3C): 4, (0x28, 0x00): 0, (0x28, 0x01): 0,
-    (0x10, 0x10): 0, (0x10, 0x15): 8, (1, 0x20): 0, (1, 0x21): 0, (1, 0x03): 0, (1, 0x61): 0,
+_KEPT = {
+    (1, 0x14): PRECISE, (1, 0x07): COARSE, (1, 0x17): FUSION, (0x28, 0x00): RAPID,
+    (1, 0x3C): "NAV-RELPOSNED", (1, 0x05): "NAV-ATT", (0x28, 0x01): "HNR-ATT",
 }  # fmt: skip
-"""where iTOW stands in the messages that are looked at, by class and number"""
+"""class and number of the messages of positions and headings"""
+_TIME_AT = {
+    **dict.fromkeys(_KEPT, 0), (1, 0x14): 4, (1, 0x3C): 4, (0x10, 0x15): 8,
+    **dict.fromkeys([(0x10, 0x10), (1, 0x20), (1, 0x21), (1, 0x03), (1, 0x61)], 0),
+}  # fmt: skip
+"""where iTOW stands in the messages that are looked at"""
 _SENSED = {(0x10, 0x02): "ESF-MEAS", (0x10, 0x03): "ESF-RAW", (0x10, 0x15): "ESF-INS"}
 
 
@@ -106,7 +111,6 @@ def _messages(
 
     Times are those of the bytes: pyubx2 gives iTOW as a time of day in UTC.
     """
-    kept = {PRECISE, COARSE, RAPID, *HEADINGS}
     messages: dict[str, list[Any]] = defaultdict(list)
     times: dict[str, list[float]] = defaultdict(list)
     sensed: list[ublox_sensors.Sensed] = []
@@ -118,10 +122,9 @@ def _messages(
             last = stamp if last is None else stamp + WEEK_S * round((last - stamp) / WEEK_S)
             # rates of HNR are those of the sample before, and it is sent before the time that it says
             sensed.append((_SENSED.get(number, "" if number[0] != 0x28 else "HNR"), last, frame[6:-2]))
-            message = parse(frame) if number != (0x10, 0x15) else None
-            if message is not None and message.identity in kept:
-                messages[message.identity].append(message)
-                times[message.identity].append(last)
+            if number in _KEPT:
+                messages[_KEPT[number]].append(parse(frame))
+                times[_KEPT[number]].append(last)
         elif number in _SENSED:
             sensed.append((_SENSED[number], np.nan, frame[6:-2]))
     return messages, dict(times), sensed

@@ -65,6 +65,8 @@ def read(path: Path, sensed: Sequence[Sensed], track: Track | None) -> Sensors:
         gyro, force = _three(values, GYRO, GYRO_UNIT), _three(values, ACCEL, ACCEL_UNIT)
         offset, said = _offset(sensed, stamps, gyro)
         found.notes.append(f"{name}: {said}")
+        if min(np.diff([stamp for _, stamp in stamps]), default=0.0) < -LATEST_S:
+            found.notes.append(f"{name}: its clock began anew on the way; what came after that is left out")
         if len(gyro) > 1 and len(force) > 1:
             shift = np.array([offset, 0.0, 0.0, 0.0])
             found.imus[name] = joined_rates(path, name, gyro + shift, force + shift)
@@ -142,8 +144,8 @@ def _offset(sensed: Sequence[Sensed], stamps: Sequence[tuple[int, float]], gyro:
     at, gps = np.array(timed).T
     after = np.searchsorted(places, at)
     later, earlier = after < len(own), after > 0
-    least = float(np.max(gps[later] - own[after[later]])) if later.any() else np.nan
-    most = float(np.max(gps[earlier] - own[after[earlier] - 1])) if earlier.any() else least
+    least, most = _most(gps[later] - own[after[later]]), _most(gps[earlier] - own[after[earlier] - 1])
+    most = least if np.isnan(most) else most
     by_order = most if np.isnan(least) else 0.5 * (least + most)
     matched = _matched(sensed, gyro, by_order)
     if matched is not None:
@@ -156,6 +158,13 @@ def _offset(sensed: Sequence[Sensed], stamps: Sequence[tuple[int, float]], gyro:
         f"GPS time is taken to be {by_order:.3f} s more, by the order of the messages alone: fixes may seem older than "
         f"they are, by up to {LATEST_S:g} s; gnss.time_offset: estimate finds it from the motion"
     )
+
+
+def _most(apart: Array) -> float:
+    """Return the most of what is near the usual: a receiver that has no time yet tells any; NaN of nothing."""
+    if not len(apart):
+        return np.nan
+    return float(apart[np.abs(apart - np.median(apart)) < 2.0 * LATEST_S].max())
 
 
 def _matched(sensed: Sequence[Sensed], gyro: Array, near: float) -> tuple[float, float] | None:

@@ -259,7 +259,7 @@ def as_lost(start: Start, before: Known, geodetic: bool) -> Start:
     length, speed = start.time - before.time, float(np.linalg.norm(before.velocity))
     told = start.sources["heading"] != "given"
     turned = 0.0 if told else min(float(np.hypot(before.heading_std, TURN_RATE * length)), ANY_HEADING)
-    if length <= STRAIGHT and not before.broken:
+    if length <= STRAIGHT and not before.ended:
         moved = before.velocity * length / metres_per_unit(before.position, geodetic)
         off = 0.5 * length**2 * np.hypot(ACCELERATION, speed * TURN_RATE) + before.heading_std * speed * length
         heading = COASTED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,17 @@ def inspect(path: str | Path) -> Facts:
         return _describe_log(path, kind)
     stream, guesses = read_stream(path)
     return {**describe(stream), "format": kind, **_problems(stream, guesses)}
+
+
+def inspect_each(paths: Sequence[str | Path]) -> list[Facts]:
+    """Describe several files; of one that cannot be read at all the kind is unknown, and the problem says why."""
+    found: list[Facts] = []
+    for path in paths:
+        try:
+            found.append(inspect(path))
+        except InputError as error:
+            found.append({"file": str(path), "kind": "unknown", "problems": [str(error)], "warnings": []})
+    return found
 
 
 def describe(stream: Stream) -> Facts:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from polyins.config import NOISE_GRADES
 from polyins.config.yaml_document import Document, as_document
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats import geoid
+from polyins.formats import geoid, rtklib, table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track, intervals
@@ -41,6 +42,7 @@ STANDING_M_S = 0.1
 """less than that a reference says of what stands"""
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
+BY_UTC = "by what both files say of UTC; an autopilot knows it to a tenth of a second; time_offset: estimate finds more"
 FORWARD_IS_A_GUESS = "forward is a guess"
 LEAST_SIGMAS = 4.0
 """of what chance makes, by which a horizontal axis agrees with the acceleration of the speed if it is forward"""
@@ -48,7 +50,7 @@ FEWEST_MEANS = 20
 """of a second, to tell which axis points forward"""
 BAROMETER_STD_M, BAROMETER_BIAS_M, WEATHER_M_SQRT_S = 1.0, 300.0, 0.1
 """noise of a barometer on a vehicle; 35 hPa; 6 m in an hour"""
-HEADING_RATE_HZ = 1.0
+BAROMETER_RATE_HZ = HEADING_RATE_HZ = 1.0
 """errors of another filter last; taken at its own rate they would be averaged away"""
 
 
@@ -62,6 +64,13 @@ class LogSource:
     stream: str = ""
     """its name, in a log"""
     log: Log | None = None
+
+    @property
+    def utc_of_zero(self) -> float | None:
+        """Unix time at which its stamps are zero, s, where its file tells it; a log gets fixes when they are old."""
+        if self.log is None:
+            return rtklib.utc_of_zero(self.path) or table.utc_of_zero(self.path)
+        return None if self.log.utc_of_zero is None else self.log.utc_of_zero + (self.log.fix_age or 0.0)
 
     @property
     def place(self) -> str:
@@ -89,23 +98,32 @@ def propose(paths: Sequence[str | Path]) -> str:
     lines = [f"# {len(imus)} IMU(s), {len(tracks)} stream(s) of positions. {marked}", *_comments(left_out)]
     lines.append("imus:")
     for number, imu in enumerate(imus, 1):
-        lines += _imu_lines(number, imu, speeds)
+        lines += _imu_lines(number, imu, imus[0], speeds)
     span = (max(one.rows.time[0] for one in imus), min(one.rows.time[-1] for one in imus))
-    # A file with attitude is a reference rather than a receiver's, if there is a choice.
-    tracks.sort(key=lambda one: (_is_estimate(one), isinstance(one.rows, Track) and one.rows.attitude is not None))
+    # Another system's solution comes last, one with attitude is a reference rather than a receiver's, if there is a
+    # choice, and positions computed afterwards are better than the log's.
+    tracks.sort(
+        key=lambda one: (
+            _is_estimate(one),
+            isinstance(one.rows, Track) and one.rows.attitude is not None,
+            one.log is not None,
+        )
+    )
     only_solution = bool(tracks) and _is_estimate(tracks[0])
     if len(tracks) > 2 and _is_estimate(tracks[-1]) and not _is_estimate(tracks[1]):
         tracks.insert(1, tracks.pop())
     sections = ["reference"] if only_solution else ["gnss", "reference"]
+    if len(tracks) > 1 and _is_receiver(tracks[1]):
+        sections = sections[:1]
     for section, track in zip(sections, tracks, strict=False):
-        lines += ["", f"{section}:", *_track_lines(section, track, span, imus[0].log)]
+        lines += ["", f"{section}:", *_track_lines(section, track, imus[0], span)]
     lines += [f"{CHECK} {one.place} also holds positions and is not used" for one in tracks[len(sections) :]]
     for heading in headings[:1]:
-        lines += ["", "heading:", *_heading_lines(heading)]
+        lines += ["", "heading:", *_heading_lines(heading, imus[0])]
     for speed in speeds[:1]:
-        lines += ["", "odometer:", *_odometer_lines(speed)]
+        lines += ["", "odometer:", *_odometer_lines(speed, imus[0])]
     for height in _sensors(read, "height")[:1] if "gnss" in sections[: len(tracks)] else []:
-        lines += ["", "height:", *_barometer_lines(height)]
+        lines += ["", "height:", *_barometer_lines(height, imus[0])]
     same_log = only_solution and tracks[0].log is not None and tracks[0].log is imus[0].log
     given = _given_start(tracks[0], span) if same_log and not headings else []
     lines += ["", "start:", *(given or [_start_line(bool(tracks) and not only_solution, tracks, headings)])]
@@ -114,10 +132,31 @@ def propose(paths: Sequence[str | Path]) -> str:
 
 def are_logs(paths: Sequence[str | Path]) -> bool:
     """Whether the files are data rather than configurations; raises InputError for some of each."""
-    kinds = [data_format(path) == "configuration" for path in paths]
+    kinds, refused = [], []
+    for path in paths:
+        try:
+            kinds.append(data_format(path) == "configuration")
+        except InputError as error:
+            refused.append(error)
+    if not kinds or (refused and any(kinds)):
+        raise refused[0]
     if any(kinds) and not all(kinds):
         raise InputError(f"{', '.join(map(str, paths))}: are configurations and data; expected one or the other")
     return not kinds[0]
+
+
+@contextmanager
+def way_named(paths: Sequence[str | Path]) -> Iterator[None]:
+    """Say of what logs lack for a start how to give it, for they have no keys."""
+    try:
+        yield
+    except InputError as error:
+        if not str(error).startswith("start:") or not are_logs(paths):
+            raise
+        raise InputError(
+            f"{error}: polyins init {' '.join(map(str, paths))} --out run.yaml writes a configuration that takes it; "
+            "motion with fixes, a second antenna or another system's attitude would tell it as well"
+        ) from None
 
 
 def settings_of(paths: Sequence[Path]) -> Settings:
@@ -179,6 +218,11 @@ def _is_estimate(of: LogSource) -> bool:
     return data_format(of.path) == "kf-gins-nav"
 
 
+def _is_receiver(of: LogSource) -> bool:
+    """Whether positions are those of a log's receiver, which judge nothing."""
+    return of.log is not None and not _is_estimate(of) and isinstance(of.rows, Track) and of.rows.attitude is None
+
+
 def _comments(texts: Sequence[str]) -> list[str]:
     """Return what is not used as comments."""
     return [f"{CHECK} {text}" for text in texts]
@@ -217,7 +261,7 @@ def _sensors(read: Sequence[LogSource], kind: str) -> list[LogSource]:
     return [one for one in read if isinstance(one.rows, SensorRows) and one.rows.kind == kind]
 
 
-def _imu_lines(number: int, imu: LogSource, speeds: list[LogSource]) -> list[str]:
+def _imu_lines(number: int, imu: LogSource, first: LogSource, speeds: list[LogSource]) -> list[str]:
     assert isinstance(imu.rows, ImuRows)
     facts = describe(imu.rows)
     lines = [f"  - name: imu{number}", f"    file: {_quoted(imu.path)}", *_format_lines(imu, "    ")]
@@ -226,7 +270,10 @@ def _imu_lines(number: int, imu: LogSource, speeds: list[LogSource]) -> list[str
         rate = (facts["rows"] - 1) / facts["duration_s"]
         repeated = facts["repeated_stamps"]
         lines.append(f"    rate_hz: {rate:.6g}  {CHECK} {repeated} stamp(s) repeat, so rows are counted")
-    if number > 1 and imu.log is None:
+    shift = _shift(imu, first)
+    if shift:
+        lines.append(f"    clock_offset_s: {shift!r}  {CHECK} {BY_UTC}")
+    elif number > 1 and imu.log is None:
         lines.append(f"    clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s")
     return [
         *lines,
@@ -343,27 +390,38 @@ def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, fl
     return best, correlation, correlation * float(np.sqrt(len(gained)))
 
 
-def _place_lines(of: LogSource) -> list[str]:
-    return [f"  file: {_quoted(of.path)}", f"  stream: {_quoted(of.stream)}"]
+def _place_lines(of: LogSource, first: LogSource) -> list[str]:
+    shift = _shift(of, first)
+    clock = [f"  clock_offset_s: {shift!r}  {CHECK} {BY_UTC}"] if shift else []
+    return [f"  file: {_quoted(of.path)}", f"  stream: {_quoted(of.stream)}", *clock]
 
 
-def _odometer_lines(of: LogSource) -> list[str]:
+def _shift(of: LogSource, first: LogSource) -> float | None:
+    """Return what brings stamps to the clock of the first IMU, s, or None where files do not tell."""
+    if of.log is first.log and of.log is not None:
+        return 0.0
+    zero, base = of.utc_of_zero, first.utc_of_zero
+    return None if zero is None or base is None else round(zero - base, 6)
+
+
+def _odometer_lines(of: LogSource, first: LogSource) -> list[str]:
     return [
-        *_place_lines(of),
+        *_place_lines(of, first),
         f"  std_m_s: 0.1  {CHECK} slip is what makes a wheel's speed wrong, not what the log states",
         f"  scale_std: 0.05  {CHECK} of a constant part of its error",
         f"  position_m: [0, 0, 0]  {CHECK} between the wheels: forward, right, down from the array's origin, m",
     ]
 
 
-def _barometer_lines(of: LogSource) -> list[str]:
+def _barometer_lines(of: LogSource, first: LogSource) -> list[str]:
     assert isinstance(of.rows, SensorRows)
     std = f"  std_m: {BAROMETER_STD_M:g}  {CHECK} wind and rotors press on it as well"
     return [
-        *_place_lines(of),
+        *_place_lines(of, first),
         std,
         f"  bias_std_m: {BAROMETER_BIAS_M:g}  {CHECK} by which the weather is off the standard atmosphere, and the sea",
         f"  bias_random_walk_m_sqrt_s: {WEATHER_M_SQRT_S:g}  {CHECK} how fast the weather changes",
+        f"  rate_hz: {BAROMETER_RATE_HZ:g}  # its errors last",
         f"  position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
     ]
 
@@ -382,7 +440,7 @@ def _format_lines(of: LogSource, indent: str) -> list[str]:
     return lines
 
 
-def _track_lines(section: str, of: LogSource, span: tuple[float, float], base: Log | None) -> list[str]:
+def _track_lines(section: str, of: LogSource, first: LogSource, span: tuple[float, float]) -> list[str]:
     track = of.rows
     assert isinstance(track, Track)
     facts = describe(track)
@@ -390,7 +448,7 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float], base: L
         f"  file: {_quoted(of.path)}",
         *_format_lines(of, "  "),
         f"  # {facts['rows']} rows, {facts['begin_s']:.3f} to {facts['end_s']:.3f} s, {facts['rate_hz'] or 0.0:.2f} Hz",
-        _clock_line(of, span, base),
+        _clock_line(of, first, span),
     ]
     antenna = of.log.antenna if of.log else None
     if section == "gnss" and antenna is not None:
@@ -415,10 +473,11 @@ def _height_line() -> str:
     )
 
 
-def _clock_line(of: LogSource, span: tuple[float, float], base: Log | None) -> str:
-    time = of.rows.time
-    if (apart := _between_clocks(of.log, base)) is not None:
-        return f"  clock_offset_s: {apart!r}  {CHECK} from the clock of one log to that of the other, by UTC"
+def _clock_line(of: LogSource, first: LogSource, span: tuple[float, float]) -> str:
+    time, shift = of.rows.time, _shift(of, first)
+    if shift:
+        age = of.log.fix_age or 0.0 if of.log else 0.0
+        return f"  clock_offset_s: {round(shift - age, 6)!r}  {CHECK} {BY_UTC}"
     if of.log is not None and of.log.fix_age is not None:
         return f"  clock_offset_s: {-of.log.fix_age:g}  {CHECK} how old fixes are when they are stamped, by the log"
     if time[-1] < span[0] or time[0] > span[1]:
@@ -429,21 +488,12 @@ def _clock_line(of: LogSource, span: tuple[float, float], base: Log | None) -> s
     return f"  clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s"
 
 
-def _between_clocks(of: Log | None, base: Log | None) -> float | None:
-    """Return what brings stamps of a log to the clock of another, s, if they differ and both count from a known UTC."""
-    if of is None or base is None or of.utc_of_zero is None or base.utc_of_zero is None:
-        return None
-    apart = of.utc_of_zero - base.utc_of_zero
-    known = {of.clock, base.clock} <= {"unix", "gps-week"}
-    return apart if known and abs(apart) > 1e-6 else None
-
-
-def _heading_lines(of: LogSource) -> list[str]:
+def _heading_lines(of: LogSource, first: LogSource) -> list[str]:
     assert isinstance(of.rows, SensorRows)
     told = of.rows.std is not None
     how = "or leave it out, to take what the log tells" if told else "the log does not tell how good this heading is"
     return [
-        *_place_lines(of),
+        *_place_lines(of, first),
         f"  std_deg: {HEADING_STD_DEG:g}  {CHECK} {how}",
         f"  offset_std_deg: {HEADING_STD_DEG:g}  {CHECK} of a constant part of its error",
         f"  rate_hz: {HEADING_RATE_HZ:g}  # its errors last",
