@@ -19,6 +19,7 @@ from polyins.formats import kf_gins, rtklib, table, xsens_dot
 from polyins.formats.columns import column_names, read_columns
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, Track
+from polyins.formats.stamps import SECONDS
 from polyins.model.recording import Array
 
 Stream = ImuRows | Track
@@ -134,7 +135,7 @@ def _imu_columns(path: str | Path, time: str, gyro: list[str], accel: list[str])
             f"{find(path)}: {len(values[0])} row(s) without increasing times and values; expected IMU data"
         )
     time_unit = _time_unit(values[0], LIKELY_RATES_HZ)
-    step = usual * table.SECONDS[time_unit]
+    step = usual * SECONDS[time_unit]
     force = float(np.nanmedian(np.linalg.norm(values[4:7], axis=0)))
     accel_unit = min(
         ("m/s^2", "g", "m/s"),
@@ -187,7 +188,7 @@ def _time_unit(stamps: Array, rates: tuple[float, float]) -> str:
     """Return the first unit that makes the rate a likely one."""
     steps = np.diff(stamps)
     step = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 1.0
-    for unit, length in table.SECONDS.items():
+    for unit, length in SECONDS.items():
         if step > 0 and rates[0] <= 1.0 / (step * length) <= rates[1]:
             return unit
     return "s"
