@@ -33,8 +33,10 @@ class FineTime(Section):
     """its unit"""
     dates: bool = False
     """it holds times of day, beside a column of days"""
-    ticks_per_s: Column | Positive | None = None
-    """it counts ticks, so many in a second: their number, or the name of the column that holds it"""
+    tick_s: Positive | None = None
+    """length of one count of a counter, s; takes the place of unit"""
+    ticks_per_s: Column | None = None
+    """the column that says how many counts a second has; takes the place of unit"""
 
 
 class TimeColumn(Section):

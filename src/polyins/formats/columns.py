@@ -62,13 +62,15 @@ class TextTable:
         the missing column or the bad line.
         """
         places = [_place(self.path, self.names, column) for column in wanted]
-        missing = sorted({place for place in places if place not in self._parsed})
+        known = dict(self._parsed)
+        missing = sorted({place for place in places if place not in known})
         if missing:
             self.source, self._content, columns = _text_columns(
                 self.source, self._content, self._dialect, missing, text_is_nan
             )
-            self._parsed |= dict(zip(missing, columns, strict=True))
-        return [self._parsed[place] for place in places]
+            known |= dict(zip(missing, columns, strict=True))
+            self._parsed = self._parsed if text_is_nan else known
+        return [known[place] for place in places]
 
     def texts(self, column: Column) -> NDArray[np.str_]:
         """Return a column as it stands there, shape (T,)."""

@@ -38,7 +38,7 @@ def stamps(table: OpenTable, time: TimeColumn) -> Array:
     return seconds if time.fine is None else seconds + _fine(table, time.fine)
 
 
-def seconds_per_count(time: TimeColumn) -> float:
+def seconds_per_count(time: TimeColumn | FineTime) -> float:
     """Return what one of a column of stamps is, s."""
     return SECONDS[time.unit] if time.tick_s is None else time.tick_s
 
@@ -48,9 +48,7 @@ def _fine(table: OpenTable, fine: FineTime) -> Array:
         return dates(table, fine.name)
     (counts,) = table.numbers([fine.name])
     if fine.ticks_per_s is None:
-        return counts * SECONDS[fine.unit]
-    if isinstance(fine.ticks_per_s, float):
-        return counts / fine.ticks_per_s
+        return counts * seconds_per_count(fine)
     (rate,) = table.numbers([fine.ticks_per_s])
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(counts / rate)

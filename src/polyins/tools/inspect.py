@@ -14,7 +14,8 @@ from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
-from polyins.reading.guess import Stream, read_stream
+from polyins.reading.guess import Stream, read_rows, read_table
+from polyins.reading.table_streams import HalfImu, stream_name
 
 Facts = dict[str, Any]
 
@@ -30,14 +31,39 @@ def inspect(path: str | Path) -> Facts:
         return _describe_configuration(path)
     if log_format(path) is not None:
         return _describe_log(path, kind)
-    stream, guesses = read_stream(path)
-    return {**describe(stream), "format": kind, **_problems(stream, guesses)}
+    if kind == "table":
+        return _describe_table(path)
+    stream = read_rows(path, kind)
+    return {**describe(stream), "format": kind, **_problems(stream, ())}
 
 
 def describe(stream: Stream) -> Facts:
     """Describe one stream: rows, span, rate, gaps, stamps, NaN, and what its values say."""
     facts = {"file": stream.source.path, "kind": "imu" if isinstance(stream, ImuRows) else "positions"}
     return {**facts, **_timing(stream.time), **(_imu(stream) if isinstance(stream, ImuRows) else _positions(stream))}
+
+
+def _describe_table(path: str | Path) -> Facts:
+    found = read_table(path)
+    if isinstance(found, HalfImu):
+        kind = f"{found.what} alone"
+        facts: Facts = {"file": found.source.path, "kind": kind, **_timing(found.time), "format": "table"}
+        other = "accelerometer" if found.what == "gyro" else "gyro"
+        return {**facts, "problems": [], "warnings": [f"{found.source.path}: is one IMU with the file of the {other}"]}
+    if len(found) == 1:
+        one = found[0]
+        return {**describe(one.rows), "format": "table", **_problems(one.rows, one.guesses)}
+    return {
+        "file": str(find(path)),
+        "kind": "table",
+        "format": "table",
+        "streams": [
+            {"stream": stream_name(found, n), **describe(one.rows), **_problems(one.rows, one.guesses)}
+            for n, one in enumerate(found)
+        ],
+        "problems": [],
+        "warnings": [],
+    }
 
 
 def _describe_log(path: str | Path, kind: str) -> Facts:

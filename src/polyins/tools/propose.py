@@ -14,6 +14,7 @@ from polyins.config import NOISE_GRADES
 from polyins.config.yaml_document import Document, as_document
 from polyins.errors import InputError
 from polyins.files import find
+from polyins.formats.columns import open_table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
@@ -22,9 +23,10 @@ from polyins.model.findings import Finding
 from polyins.model.recording import Recording, usual_interval
 from polyins.model.rig import DEG, HOUR
 from polyins.reading import loading
-from polyins.reading.guess import guess_columns, read_stream
+from polyins.reading.guess import read_stream, read_table
 from polyins.reading.loading import Settings
 from polyins.reading.long_recording import LongRecording
+from polyins.reading.table_streams import DATUM, HalfImu, TableStream, described, joined
 from polyins.tools.inspect import describe
 
 CHECK = "# CHECK:"
@@ -36,6 +38,7 @@ MEDIAN_TO_STD = 1.4826
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
 FORWARD_IS_A_GUESS = "forward is a guess"
+GUESSED = ("scale is a guess", "unit is a guess")
 LEAST_SIGMAS = 4.0
 """of what chance makes, by which a horizontal axis agrees with the acceleration of the speed if it is forward"""
 FEWEST_MEANS = 20
@@ -54,6 +57,7 @@ class LogSource:
     stream: str = ""
     """its name, in a log"""
     log: Log | None = None
+    table: TableStream | None = None
 
     @property
     def place(self) -> str:
@@ -81,7 +85,7 @@ def propose(paths: Sequence[str | Path]) -> str:
     lines = [f"# {len(imus)} IMU(s), {len(tracks)} stream(s) of positions. {marked}", *_comments(left_out)]
     lines.append("imus:")
     for number, imu in enumerate(imus, 1):
-        lines += _imu_lines(number, imu, speeds)
+        lines += _imu_lines(number, imu, imus[0], speeds)
     span = (max(one.rows.time[0] for one in imus), min(one.rows.time[-1] for one in imus))
     # A file with attitude is a reference rather than a receiver's, if there is a choice.
     tracks.sort(key=lambda one: isinstance(one.rows, Track) and one.rows.attitude is not None)
@@ -116,7 +120,11 @@ def settings_of(paths: Sequence[Path]) -> Settings:
 def doubted(recording: Recording | LongRecording, assumed: Sequence[str]) -> Recording | LongRecording:
     """Return a recording with a doubt for each assumption that would turn the heading if it were wrong."""
     remedy = "give axes in a configuration (polyins init writes one)"
-    guesses = tuple(Finding("mount", text, "doubt", remedy=remedy) for text in assumed if FORWARD_IS_A_GUESS in text)
+    guesses = tuple(
+        Finding("mount", text, "doubt", remedy=remedy)
+        for text in assumed
+        if FORWARD_IS_A_GUESS in text or any(guess in text for guess in GUESSED)
+    )
     if isinstance(recording, LongRecording):
         head = recording.head
         return replace(recording, head=replace(head, findings=(*head.findings, *guesses)))
@@ -136,6 +144,7 @@ def assumptions(proposal: str) -> list[str]:
 def _sources(paths: Sequence[str | Path]) -> tuple[list[LogSource], list[str]]:
     """Return the streams that can be used, and why others are not; raises InputError if no file is readable."""
     found: list[LogSource] = []
+    halves: list[HalfImu] = []
     left_out: list[str] = []
     refused: list[InputError] = []
     for path in paths:
@@ -149,13 +158,32 @@ def _sources(paths: Sequence[str | Path]) -> tuple[list[LogSource], list[str]]:
                 ]
                 left_out += [f"{path}: {name} is not used: {why}" for name, why in log.unusable.items()]
                 left_out += [f"{path}: {note}" for note in log.notes]
+            elif data_format(path) == "table":
+                streams = read_table(path)
+                if isinstance(streams, HalfImu):
+                    halves.append(streams)
+                else:
+                    found += [LogSource(path, one.rows, one.guesses, table=one) for one in streams]
             else:
                 found.append(LogSource(path, *read_stream(path)))
         except InputError as error:
             refused.append(error)
+    found += _paired(halves, left_out)
     if refused and not found:
         raise refused[0]
     return found, [*left_out, *(f"not used: {error}" for error in refused)]
+
+
+def _paired(halves: Sequence[HalfImu], left_out: list[str]) -> list[LogSource]:
+    """Return the IMUs of files of a gyro and files of an accelerometer, in their order."""
+    gyros, accels = ([half for half in halves if half.what == what] for what in ("gyro", "accel"))
+    found = []
+    for gyro, accel in zip(gyros, accels, strict=False):
+        one = described(open_table(gyro.source.path), joined(gyro, accel), [])
+        found.append(LogSource(gyro.source.path, one.rows, one.guesses, table=one))
+    for half in (*gyros[len(accels) :], *accels[len(gyros) :]):
+        left_out.append(f"{half.source.path}: holds the {half.what} of an IMU alone, and is not used")
+    return found
 
 
 def _comments(texts: Sequence[str]) -> list[str]:
@@ -178,7 +206,7 @@ def _sensors(read: Sequence[LogSource], kind: str) -> list[LogSource]:
     return [one for one in read if isinstance(one.rows, SensorRows) and one.rows.kind == kind]
 
 
-def _imu_lines(number: int, imu: LogSource, speeds: list[LogSource]) -> list[str]:
+def _imu_lines(number: int, imu: LogSource, first: LogSource, speeds: list[LogSource]) -> list[str]:
     assert isinstance(imu.rows, ImuRows)
     facts = describe(imu.rows)
     lines = [f"  - name: imu{number}", f"    file: {_quoted(imu.path)}", *_format_lines(imu, "    ")]
@@ -187,7 +215,7 @@ def _imu_lines(number: int, imu: LogSource, speeds: list[LogSource]) -> list[str
         rate = (facts["rows"] - 1) / facts["duration_s"]
         repeated = facts["repeated_stamps"]
         lines.append(f"    rate_hz: {rate:.6g}  {CHECK} {repeated} stamp(s) repeat, so rows are counted")
-    if number > 1 and imu.log is None:
+    if number > 1 and imu.log is None and imu.path != first.path:
         lines.append(f"    clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s")
     return [
         *lines,
@@ -287,11 +315,11 @@ def _format_lines(of: LogSource, indent: str) -> list[str]:
         return [f"{indent}stream: {_quoted(of.stream)}"]
     kind = data_format(of.path)
     lines = [f"{indent}format: {TRACK_FORMATS.get(kind, kind)}"]
-    if kind != "table" or not of.notes:
+    if of.table is None or of.table.columns is None:
         return lines
-    columns, _ = guess_columns(of.path)
-    lines.append(f"{indent}columns:  {CHECK} names and units")
-    for group, content in columns.model_dump(mode="json", exclude_none=True).items():
+    lines.append(f"{indent}columns:  {CHECK} {'; '.join(['names and units', *of.table.checks])}")
+    written = of.table.columns.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    for group, content in written.items():
         lines.append(f"{indent}  {group}: {_flow(content)}")
     return lines
 
@@ -314,6 +342,11 @@ def _track_lines(section: str, of: LogSource, span: tuple[float, float]) -> list
         lines.append(f"  {point}: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m")
     if section == "gnss" and track.position_std is None:
         lines.append(f"  position_std_m: [1.5, 1.5, 3.0]  {CHECK} north, east, down; the file has none")
+    unknown = [check for check in of.table.checks if check.startswith(DATUM)] if of.table else []
+    lines += [
+        f"  height: as-given  {CHECK} {text}; sea-level with geoid_height_m, or ellipsoidal, say which"
+        for text in unknown
+    ]
     if track.above_sea:
         lines.append(f"  height: as-given  {CHECK} above the sea; sea-level with geoid_height_m makes them ellipsoidal")
     return lines

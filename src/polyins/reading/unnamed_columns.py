@@ -1,0 +1,168 @@
+"""The streams of a table without header: which columns hold what follows from physics, or is asked for.
+
+Stamps rise evenly. Three neighbouring columns whose length is about the same most of the time, and 1 g in some unit,
+are a specific force; three next to them whose mean is small beside their range are turn rates.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from polyins.errors import InputError
+from polyins.formats.columns import OpenTable
+from polyins.model.recording import Array
+from polyins.reading import likely_units as likely
+from polyins.reading.likely_units import Likely
+from polyins.reading.table_streams import TableStream, described
+from polyins.reading.time_columns import TimeGuess, guessed
+
+MOST_SENSORS = 64
+STEADY = 0.35
+"""spread of the length of a specific force, relative to it, half of the time"""
+LEAST_ROWS = 20
+FULL_WORD = "without a header, the columns are told by their values"
+
+
+def streams_of(opened: OpenTable) -> list[TableStream]:
+    """Return the IMUs of a table without header; raise InputError that names its columns if values do not tell them."""
+    columns = opened.numbers(list(range(1, len(opened.names) + 1)))
+    if len(columns) < 7 or len(columns[0]) < LEAST_ROWS:
+        raise _untold(opened, columns)
+    apart = _groups(columns)
+    groups = [rows for _, rows in apart[1]] if apart else [np.arange(len(columns[0]))]
+    time = _time(columns, groups, None if apart is None else apart[0])
+    if time is None:
+        raise _untold(opened, columns)
+    used = {*time.column_numbers, *([] if apart is None else [apart[0]])}
+    sensors = _sensors(columns, groups, used, time)
+    if sensors is None:
+        raise _untold(opened, columns)
+    found = []
+    gyro, accel, turning, force = sensors
+    for number, rows in enumerate(groups):
+        declared: dict[str, Any] = {
+            "time": time.guess.of_rows(rows).column,
+            "gyro": {"names": [n + 1 for n in gyro], "unit": turning.unit, "scale": turning.scale},
+            "accel": {"names": [n + 1 for n in accel], "unit": force.unit, "scale": force.scale},
+        }
+        for unit, key in ((turning, "gyro"), (force, "accel")):
+            if unit.scale == 1.0:
+                del declared[key]["scale"]
+        if apart is not None:
+            declared["only"] = {"name": apart[0] + 1, "equal": apart[1][number][0]}
+        found.append(described(opened, declared, [FULL_WORD, time.guess.doubt, force.doubt, turning.doubt]))
+    return found
+
+
+def _untold(opened: OpenTable, columns: list[Array]) -> InputError:
+    ranges = (f"{n} from {np.nanmin(column):.6g} to {np.nanmax(column):.6g}" for n, column in enumerate(columns, 1))
+    return InputError(
+        f"{opened.path}: has no header, and its {len(columns)} columns ({'; '.join(ranges)}) do not tell what they are; "
+        "expected them declared by number, as columns: {time: {name: 1, unit: s}, gyro: {names: [2, 3, 4], unit: rad/s}, "
+        "accel: {names: [5, 6, 7], unit: m/s^2}}"
+    )
+
+
+def _groups(columns: list[Array]) -> tuple[int, list[tuple[int, Any]]] | None:
+    """Return the column of few whole numbers that tells IMUs apart, and the rows of each number."""
+    for n, column in enumerate(columns):
+        if not likely.are_whole(column) or not np.isfinite(column).all():
+            continue
+        values, counts = np.unique(column, return_counts=True)
+        changes = float(np.mean(np.diff(column) != 0.0))
+        if 2 <= len(values) <= MOST_SENSORS and counts.min() >= 5 and changes > 0.5 and counts.max() < 2 * counts.min():
+            return n, [(int(value), np.flatnonzero(column == value)) for value in values]
+    return None
+
+
+class _Stamps:
+    """The stamps, and the columns (from 0) that they are made of."""
+
+    def __init__(self, guess: TimeGuess, column_numbers: tuple[int, ...]) -> None:
+        self.guess = guess
+        self.column_numbers = column_numbers
+
+
+def _time(columns: list[Array], groups: list[Any], apart: int | None) -> _Stamps | None:
+    """Return the column whose numbers rise by even steps, rather than by one, in each group of rows."""
+    counter = None
+    for n, column in enumerate(columns):
+        if n == apart:
+            continue
+        if (ticks := _with_ticks(columns, n, groups)) is not None:
+            return ticks
+        found = guessed(n + 1, column[groups[0]] if len(groups) > 1 else column)
+        steps = [np.diff(guessed(n + 1, column[rows]).seconds) for rows in groups]
+        rising = all(float(np.mean(one > 0.0)) > 0.9 and float(np.mean(one >= 0.0)) > 0.99 for one in steps)
+        if not rising or likely.time_unit(found.seconds, (5.0, 2e4)) != "s":
+            continue
+        if likely.are_whole(column) and bool((np.diff(column) == 1.0).all()):
+            counter = counter or n
+            continue
+        whole = guessed(n + 1, column)
+        return _Stamps(whole, (n,))
+    return None
+
+
+def _with_ticks(columns: list[Array], n: int, groups: list[Any]) -> _Stamps | None:
+    """Return stamps of whole seconds, ticks since then, and the ticks that a second has, in three columns."""
+    if n + 2 >= len(columns):
+        return None
+    seconds, ticks, rate = columns[n : n + 3]
+    if not (likely.are_whole(seconds) and likely.are_whole(ticks) and float(np.median(rate)) > 1e3):
+        return None
+    even = float(np.ptp(rate)) < 0.05 * float(np.median(rate))
+    inside = float(np.mean((ticks >= 0.0) & (ticks < 1.1 * rate)))
+    steady = set(np.unique(np.diff(seconds[groups[0]]))) <= {0.0, 1.0}
+    if not (even and inside > 0.99 and steady):
+        return None
+    column = {"name": n + 1, "unit": "s", "fine": {"name": n + 2, "ticks_per_s": n + 3}}
+    return _Stamps(TimeGuess(column, seconds + ticks / rate), (n, n + 1, n + 2))
+
+
+Sensors = tuple[tuple[int, int, int], tuple[int, int, int], Likely, Likely]
+
+
+def _sensors(columns: list[Array], groups: list[Any], used: set[int], time: _Stamps) -> Sensors | None:
+    """Return the columns of gyro and accelerometer, from 0, and their units; None if they are not clear."""
+    triples = [(n, n + 1, n + 2) for n in range(len(columns) - 2) if not {n, n + 1, n + 2} & used]
+    stamps = time.guess.of_rows(groups[0]).seconds
+    steps = np.diff(stamps)
+    step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    forces = []
+    for triple in triples:
+        parts = [np.column_stack([columns[n][rows] for n in triple]) for rows in groups]
+        unit = likely.accel_unit(parts[0], step, parts[1:])
+        if unit is not None and all(_steady(part) for part in parts) and (unit.doubt == "" or _near_range(parts)):
+            size = float(np.median([likely.typical_size(part) for part in parts]))
+            forces.append((abs(np.log(size * _si(unit, step) / 9.8)), triple, unit, parts[0]))
+    for _, accel, unit, force in sorted(forces, key=lambda one: one[0]):
+        beside = [one for one in triples if one[0] in (accel[0] + 3, accel[0] - 3)]
+        rates = [(one, np.column_stack([columns[n][groups[0]] for n in one])) for one in beside]
+        likely_rates = [(one, values) for one, values in rates if _turns(values)]
+        if likely_rates:
+            gyro, values = min(likely_rates, key=lambda one: likely.typical_size(one[1]))
+            return gyro, accel, likely.gyro_unit(values, force, step, unit), unit
+    return None
+
+
+def _si(unit: Likely, step: float) -> float:
+    return unit.scale * {"m/s^2": 1.0, "g": 9.80665, "m/s": 1.0 / step if step else np.nan}[unit.unit]
+
+
+def _steady(vectors: Array) -> bool:
+    sizes = np.linalg.norm(vectors, axis=1)
+    low, middle, high = np.nanquantile(sizes, [0.25, 0.5, 0.75])
+    return bool(middle > 0.0 and (high - low) < STEADY * middle)
+
+
+def _near_range(parts: list[Array]) -> bool:
+    return float(np.median([likely.typical_size(part) for part in parts])) < 2.0**15
+
+
+def _turns(values: Array) -> bool:
+    """Whether vectors are turn rates rather than a field: at rest they are small beside what they are in motion."""
+    sizes = np.linalg.norm(values, axis=1)
+    return bool(np.isfinite(sizes).all() and (not _steady(values) or likely.quietest(values, 0.0) < np.median(sizes)))
