@@ -106,10 +106,10 @@ def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) ->
             continue
         value = f"{np.degrees(largest):.4g} deg/s" if k < 3 else f"{largest:.4g} m/s^2"
         remedy = "; gyro_range_deg_s leaves such rows out" if k < 3 else ""
+        imu = f"IMU {name}" if name else "the IMU"
         texts.append(
-            f"{rows.source.path}: {NAMES[k]} of IMU {name} stays at exactly {value}, its largest value, "
-            f"{len(runs)} time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its "
-            f"range?{remedy}"
+            f"{rows.source.path}: {NAMES[k]} of {imu} stays at exactly {value}, its largest value, {len(runs)} "
+            f"time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its range?{remedy}"
         )
     return tuple(texts)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from polyins.files import find
 from polyins.formats.gps_time import utc_of_week
-from polyins.formats.log import Log, counted, damage_named, needed, rates_to_rows, rising
+from polyins.formats.log import Log, counted, damage_named, needed, rates_to_rows, rising, silenced
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -32,7 +32,7 @@ def read(path: str | Path) -> Log:
     """Read the streams; raises InputError for a damaged file or without pymavlink."""
     found = find(path)
     library = needed("pymavlink.DFReader", "ardupilot", found)
-    with damage_named(found, "ArduPilot DataFlash"):
+    with damage_named(found, "ArduPilot DataFlash"), silenced():
         tables, parameters = _tables(library.DFReader_binary(str(found)))
         imus = _imus(found, tables)
         tracks = _tracks(found, tables)

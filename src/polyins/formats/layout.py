@@ -69,6 +69,18 @@ def layout(path: str | Path, content: bytes, header_has: str = "") -> Dialect:
     return Dialect(delimiter, names, first + 1, comma, cut)
 
 
+def sample(content: bytes) -> tuple[Dialect, list[list[str]]] | None:
+    """Return how the first bytes of a text are built, and the cells of its first rows; None if it has no rows."""
+    lines = content[:HEAD_BYTES].decode("utf-8-sig", errors="replace").splitlines()
+    found = _rows(lines)
+    if found is None:
+        return None
+    delimiter, width, first, comma = found
+    names, _ = _header(lines, first, delimiter, width)
+    cells = [fields for line in lines[first:] if len(fields := split(line, delimiter)) == width and is_row(fields)]
+    return Dialect(delimiter, names, first + 1, comma), cells
+
+
 def _below_header(path: str | Path, lines: list[str], header_has: str) -> Dialect:
     start = next((n for n, line in enumerate(lines) if header_has in line and not is_preamble(line)), None)
     if start is None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -68,6 +69,22 @@ def damage_named(path: Path, what: str) -> Iterator[None]:
     except Exception as error:  # libraries raise whatever they stumble over
         reason = str(error).strip() or type(error).__name__
         raise InputError(f"{path}: cannot be read as {what} ({reason.splitlines()[0]}); is it damaged?") from error
+
+
+@contextmanager
+def silenced() -> Iterator[None]:
+    """Keep what a library prints, from Python or from C, off standard output and standard error."""
+    with open(os.devnull, "w") as nowhere:
+        kept = {number: os.dup(number) for number in (1, 2)}
+        try:
+            for number in kept:
+                os.dup2(nowhere.fileno(), number)
+            with redirect_stdout(nowhere), redirect_stderr(nowhere):
+                yield
+        finally:
+            for number, was in kept.items():
+                os.dup2(was, number)
+                os.close(was)
 
 
 def rates_to_rows(path: Path, name: str, time: Array, gyro: Array, force: Array) -> ImuRows:

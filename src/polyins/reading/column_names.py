@@ -11,10 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 GYRO = (
-    r"gyroscope|gyros|gyro_rate|gyro_?rotation|gyro|gyr|gy|angular_?velocity|angular_?rate|ang_?vel|ang_?rate|rotation_?rate|omega|omg"
-    r"|w_rs_s|w|g"
+    r"gyroscope|gyros|gyro_rate|gyro_?rotation|gyro|gyr|gy|angular_?velocity|angular_?rate|ang_?vel|ang_?rate"
+    r"|rotation_?rate|omega|omg|w_rs_s|w|g"
 )
-ACCEL = r"accelerometer|accelerations?|accel|acce|acc|ac|linear_?acceleration|linear_?accel|specific_?force|sf|a_rs_s|fb|f|a"
+ACCEL = (
+    r"accelerometer|accelerations?|accel|acce|acc|ac|linear_?acceleration|linear_?accel|specific_?force|sf|a_rs_s"
+    r"|fb|f|a"
+)
 ANGLE_INCREMENT = r"d_?theta|delta_?theta|delta_?angle|theta"
 VELOCITY_INCREMENT = r"d_?vel|dv|delta_?vel(ocity)?|delta_?v"
 UNIT = r"deg_s(ec)?|deg|dps|mdps|rad_s(ec)?|rad|mrad_s|m_s_?2|m_s_s|mps2|ms2|mg|g|m_s|raw|counts"
@@ -57,7 +60,11 @@ TIME = (
 )
 TIME_BEHIND = r"time|time_?stamp|stamp|tow|time_usec|time_us|time_ms|date_?time"
 """may have words before it"""
-NUMBER = r"((imu|sensor|device|dev|node|unit|chip|board|module|channel|instance)(_?(id|no|nr|num|number|index|name|tag))?|id|type|kind)"
+NUMBER = (
+    r"(imu|sensor|device|dev|node|unit|chip|board|module|channel|instance)(_?(id|no|nr|num|number|index|name|tag))?"
+    r"|id|type|kind"
+)
+"""of a sensor among several"""
 LATITUDE = r"(.*_)?lat(itude)?(_?gnss|_?gps)?"
 LONGITUDE = r"(.*_)?(lon|long|lng|longitude)(_?gnss|_?gps)?"
 ELLIPSOIDAL = r"h|height|hae|hgt|(.*_)?(height|alt|altitude|h|hgt)_?(gnss|gps|ellips\w*|above_ellips\w*|hae|wgs84)"
@@ -88,6 +95,8 @@ SPEED_STD = r"s_?acc|speed_?(accuracy|acc)|s_variance(_m_s)?"
 FIX_TYPE = r"fix_?type|gps_?fix(_?type)?"
 ATTITUDE = (r"roll", r"pitch", r"(compass_?)?heading|yaw|azimuth")
 ANGLES = {
+    "degree": ("deg", 1.0),
+    "radians": ("rad", 1.0),
     "deg": ("deg", 1.0),
     "degrees": ("deg", 1.0),
     "rad": ("rad", 1.0),

@@ -117,17 +117,17 @@ def _g(unit: str) -> float:
 
 def quietest(values: Array, step: float) -> float:
     """Return the noise of a row, in the unit of the values, shape (T, 3), in the quietest tenth of the seconds."""
-    rows = max(int(round(1.0 / step)) if step > 0.0 else 1, 8)
+    rows = max(round(1.0 / step) if step > 0.0 else 1, 8)
     count = len(values) // rows
     if not count:
         return 0.0
     changes = np.diff(values[: count * rows].reshape(count, rows, 3), 2, axis=1)
-    return float(np.nanquantile(np.nanstd(changes, axis=1).max(axis=1), 0.1)) / np.sqrt(6.0)
+    return float(np.nanquantile(np.nanstd(changes, axis=1).max(axis=1), 0.1) / np.sqrt(6.0))
 
 
 def turn_of_gravity(rates: Array, force: Array, step: float) -> float | None:
     """Return how much the force turns for a turn of the gyro, both of shape (T, 3), where they agree; else None."""
-    rows = max(int(round(WINDOW_S / step)) if step > 0.0 else 1, 1)
+    rows = max(round(WINDOW_S / step) if step > 0.0 else 1, 1)
     count = len(rates) // rows
     if count < 20:
         return None
@@ -145,7 +145,7 @@ def turn_of_gravity(rates: Array, force: Array, step: float) -> float | None:
 def angle_scale(latitude: Array, longitude: Array) -> float:
     """Return how many degrees one is, of the powers of ten that receivers use."""
     largest = max(float(np.nanmax(np.abs(latitude), initial=0.0)), float(np.nanmax(np.abs(longitude), initial=0.0)) / 4)
-    return next((scale for scale in (1.0, 1e-7) if largest * scale <= 90.0), 1e-9)
+    return 1.0 if largest <= 90.0 else 1e-7 if largest <= 90e7 else 1e-9
 
 
 def are_whole(values: Array) -> bool:
@@ -163,4 +163,5 @@ def speed_scale(velocity: Array, moved: Array) -> tuple[float, bool]:
     if not size > 0.0 or both < AGREES * np.sqrt(size * float(np.nansum(velocity * velocity))):
         return 1.0, False
     ratio = both / size
-    return min((1.0, 1e-1, 1e-2, 1e-3), key=lambda scale: abs(np.log(ratio * scale))), True
+    off = {scale: abs(float(np.log(ratio * scale))) for scale in (1.0, 1e-1, 1e-2, 1e-3)}
+    return min(off, key=lambda scale: off[scale]), True

@@ -13,6 +13,7 @@ from polyins.errors import InputError
 from polyins.formats import table
 from polyins.formats.columns import OpenTable
 from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.stamps import stamps
 from polyins.model.geodesy import displacement
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -25,7 +26,7 @@ from polyins.reading.time_columns import TimeGuess, time_column
 MOST_SENSORS = 64
 FEWEST_OF_EACH = 5
 """rows of an IMU among those of others"""
-WEEK_S = 604800.0
+FIX_RATES_HZ = (likely.SLOWEST_FIX_HZ, likely.FASTEST_FIX_HZ)
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,8 @@ def _imus(
     found = []
     for (_, gyro, accel, increments), force in zip(pairs, forces, strict=True):
         rates = np.column_stack(opened.numbers(gyro[0]))
-        for only, rows in apart or [(None, slice(None))]:
+        of_each: list[tuple[dict[str, Any] | None, Any]] = [*apart] if apart else [(None, slice(None))]
+        for only, rows in of_each:
             others = [force[here] for _, here in apart] if apart else forces
             whole = _Sensors(gyro, accel, rates[rows], force[rows], others, increments)
             found.append(_imu(opened, time.of_rows(rows), whole, only))
@@ -140,8 +142,7 @@ class _Sensors:
 def _imu(opened: OpenTable, time: TimeGuess, of: _Sensors, only: dict[str, Any] | None) -> TableStream:
     there = np.isfinite(of.rates).all(axis=1), np.isfinite(of.force).all(axis=1)
     split = not (there[0] & there[1]).any() and there[0].any() and there[1].any()
-    stamps = time.seconds[there[0] & np.isfinite(time.seconds)]
-    steps = np.diff(stamps)
+    steps = np.diff(time.seconds[there[0] & np.isfinite(time.seconds)])
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     if not step > 0.0 or not there[1].any():
         raise InputError(
@@ -227,9 +228,8 @@ def _as_number(text: str) -> tuple[float, str]:
 
 def _rows_of_sensors(opened: OpenTable, time: TimeGuess) -> TableStream | None:
     """Return the IMU of a table with rows of a gyro and rows of an accelerometer, which a word tells apart."""
-    axes = next((three for three in (("x", "y", "z"), ("v0", "v1", "v2"), ("v1", "v2", "v3")) if
-                 (found := first_of_each(opened.names, three))), None)  # fmt: skip
-    names = first_of_each(opened.names, axes) if axes else None
+    threes = (("x", "y", "z"), ("v0", "v1", "v2"), ("v1", "v2", "v3"))
+    names = next((found for three in threes if (found := first_of_each(opened.names, three))), None)
     if names is None:
         return None
     for name in named(opened.names, said.NUMBER + "|sensor_?(type|name)|source|event"):
@@ -240,8 +240,8 @@ def _rows_of_sensors(opened: OpenTable, time: TimeGuess) -> TableStream | None:
         if len(gyro) == 1 and len(accel) == 1:
             values = np.column_stack(opened.numbers(names))
             here = {"gyro": texts == gyro[0], "accel": texts == accel[0]}
-            stamps = time.seconds[here["gyro"]]
-            step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+            at = time.seconds[here["gyro"]]
+            step = float(np.median(np.diff(at))) if len(at) > 1 else 0.0
             force, rates = values[here["accel"]], values[here["gyro"]]
             unit = likely.accel_unit(force, step)
             if unit is None:
@@ -290,15 +290,15 @@ def _half_of(opened: OpenTable, time: TimeGuess, what: str, names: Three, unit: 
 
 def joined(gyro: HalfImu, accel: HalfImu) -> dict[str, Any]:
     """Return the columns of the IMU that two files make, the gyro's being the one that is named."""
-    stamps = gyro.time[np.isfinite(gyro.time)]
-    step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    at = gyro.time[np.isfinite(gyro.time)]
+    step = float(np.median(np.diff(at))) if len(at) > 1 else 0.0
     force, rates = dict(accel.columns), dict(gyro.columns)
     if "unit" not in force:
         unit = likely.accel_unit(accel.values, step)
         if unit is None:
             raise InputError(
-                f"{accel.source.path}: values are 1 g in no unit; expected specific force (is gravity taken out?), else "
-                "declare columns with unit and scale"
+                f"{accel.source.path}: values are 1 g in no unit; expected specific force (is gravity taken out?), "
+                "else declare columns with unit and scale"
             )
         force |= {"unit": unit.unit} | _scaled(unit)
     if "unit" not in rates:
@@ -314,6 +314,7 @@ def joined(gyro: HalfImu, accel: HalfImu) -> dict[str, Any]:
 
 def _track(opened: OpenTable, time: TimeGuess) -> TableStream | None:
     """Return the positions of a table, with the velocity, attitude and standard deviations that stand beside them."""
+    time = time.at_rates(FIX_RATES_HZ)
     latitude, longitude = (named(opened.names, one, "deg|rad|1e7|e7") for one in (said.LATITUDE, said.LONGITUDE))
     if latitude and longitude:
         return _geodetic(opened, time, latitude[0], longitude[0])
@@ -408,7 +409,7 @@ def _with_the_rest(
             break
     if attitude := first_of_each(names, said.ATTITUDE, "deg|rad"):
         angles = opened.numbers(attitude)
-        stated = said.unit_of(attitude[0])
+        stated, _ = said.ANGLES.get(said.unit_of(attitude[0]), ("", 1.0))
         degrees = max(float(np.nanmax(np.abs(angle), initial=0.0)) for angle in angles) > 2 * np.pi
         declared["attitude"] = {"names": attitude, "unit": stated or ("deg" if degrees else "rad")}
     columns = TrackColumns.model_validate(declared)
@@ -441,7 +442,7 @@ def _speed(
     good = np.isfinite(places).all(axis=1)
     time = TrackColumns.model_validate(declared).time
     assert time is not None
-    at = table.stamps(opened, time)
+    at = stamps(opened, time)
     good &= np.isfinite(at)
     if good.sum() > 2:
         moved = displacement(places[good], places[good][0], True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,9 +24,7 @@ RANGES = (604800.0, 604800e3, 2.0**16, 2.0**24, 2.0**31, 2.0**32, 2.0**31 / 1000
 NEAR_END = 0.05
 """of its range: where a counter is before and after it starts again"""
 RATES_HZ = (likely.SLOWEST_FIX_HZ, likely.LIKELY_RATES_HZ[1])
-FINE = {
-    r"(?P<of>.*?)(seconds|secs|sec|s)": r"{of}(nanoseconds|nanosecs|nanosec|nsecs|nsec|nanos|ns|microseconds|usecs|usec|us|milliseconds|msecs|msec|ms)",
-}
+SECONDS_NAME = r"(?P<of>.*?)(seconds|secs|sec|s)"
 
 
 @dataclass(frozen=True)
@@ -44,6 +43,10 @@ class TimeGuess:
         if self.counts is None:
             return replace(self, seconds=self.seconds[rows])
         return guessed(self.column["name"], self.counts[rows])
+
+    def at_rates(self, rates: tuple[float, float]) -> TimeGuess:
+        """Return the stamps of rows that come at such rates, Hz."""
+        return self if self.counts is None else guessed(self.column["name"], self.counts, rates)
 
 
 def time_column(opened: OpenTable) -> TimeGuess | None:
@@ -67,13 +70,13 @@ def time_column(opened: OpenTable) -> TimeGuess | None:
     return None
 
 
-def guessed(name: str | int, counts: Array) -> TimeGuess:
+def guessed(name: str | int, counts: Array, rates: tuple[float, float] = likely.LIKELY_RATES_HZ) -> TimeGuess:
     """Return the stamps of a column of numbers, by its name and by the rate that they make."""
     column: dict[str, Any] = {"name": name}
     end = wraps_at(counts)
     whole = counts if end is None else unwrapped(counts, end)
     stated = said.time_unit_of(name) if isinstance(name, str) else None
-    unit = stated or likely.time_unit(whole, likely.LIKELY_RATES_HZ) or likely.time_unit(whole, RATES_HZ)
+    unit = stated or likely.time_unit(whole, rates) or likely.time_unit(whole, RATES_HZ)
     doubt = ""
     if stated is not None and not _likely(whole, stated):
         other = likely.time_unit(whole, likely.LIKELY_RATES_HZ)
@@ -120,24 +123,21 @@ def _read(opened: OpenTable, column: dict[str, Any]) -> TimeGuess:
 
 def _in_two_columns(opened: OpenTable) -> dict[str, Any] | None:
     """Return seconds and what is beyond them, where two columns have such names."""
-    import re
-
     plain = {parsed(name).plain: name for name in opened.names if name}
-    for coarse, pattern in FINE.items():
-        for one, name in plain.items():
-            match = re.fullmatch(coarse, one)
-            if match is None:
-                continue
-            fitting = re.compile(pattern.format(of=re.escape(match["of"])))
-            for other, fine in plain.items():
-                unit = said.TIME_UNITS.get(other.removeprefix(match["of"]).strip("_"))
-                if unit and unit != "s" and fitting.fullmatch(other) and _is_rest(opened, name, fine, unit):
-                    return {"name": name, "unit": "s", "fine": {"name": fine, "unit": unit}}
+    for one, name in plain.items():
+        match = re.fullmatch(SECONDS_NAME, one)
+        for other, fine in plain.items() if match else ():
+            of = match["of"] if match else ""
+            unit = said.TIME_UNITS.get(other.removeprefix(of).strip("_")) if other.startswith(of) else None
+            if unit not in (None, "s") and _is_rest(opened, name, fine, str(unit)):
+                return {"name": name, "unit": "s", "fine": {"name": fine, "unit": unit}}
     return None
 
 
 def _is_rest(opened: OpenTable, coarse: str, fine: str, unit: str) -> bool:
-    whole, rest = opened.numbers([coarse, fine])
+    whole, rest = _numbers(opened, coarse), _numbers(opened, fine)
+    if whole is None or rest is None:
+        return False
     small = (rest[np.isfinite(rest)] * SECONDS[unit] < 1.0).all()
     return bool(likely.are_whole(whole) and small and np.isfinite(rest).any())
 

@@ -13,6 +13,7 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.formats.columns import OpenTable
 from polyins.model.recording import Array
+from polyins.model.rig import STANDARD_GRAVITY
 from polyins.reading import likely_units as likely
 from polyins.reading.likely_units import Likely
 from polyins.reading.table_streams import TableStream, described
@@ -22,7 +23,11 @@ MOST_SENSORS = 64
 STEADY = 0.35
 """spread of the length of a specific force, relative to it, half of the time"""
 LEAST_ROWS = 20
-FULL_WORD = "without a header, the columns are told by their values"
+ASKEW = 0.3
+"""against threes that do not begin where columns begin"""
+CENTRED = 300.0
+"""times the spread of turn rates their mean may be"""
+NO_HEADER = "without a header, the columns are told by their values"
 
 
 def streams_of(opened: OpenTable) -> list[TableStream]:
@@ -52,17 +57,22 @@ def streams_of(opened: OpenTable) -> list[TableStream]:
                 del declared[key]["scale"]
         if apart is not None:
             declared["only"] = {"name": apart[0] + 1, "equal": apart[1][number][0]}
-        found.append(described(opened, declared, [FULL_WORD, time.guess.doubt, force.doubt, turning.doubt]))
+        found.append(described(opened, declared, [NO_HEADER, time.guess.doubt, force.doubt, turning.doubt]))
     return found
 
 
 def _untold(opened: OpenTable, columns: list[Array]) -> InputError:
-    ranges = (f"{n} from {np.nanmin(column):.6g} to {np.nanmax(column):.6g}" for n, column in enumerate(columns, 1))
+    ranges = (f"{n} {_range(column)}" for n, column in enumerate(columns, 1))
     return InputError(
-        f"{opened.path}: has no header, and its {len(columns)} columns ({'; '.join(ranges)}) do not tell what they are; "
-        "expected them declared by number, as columns: {time: {name: 1, unit: s}, gyro: {names: [2, 3, 4], unit: rad/s}, "
-        "accel: {names: [5, 6, 7], unit: m/s^2}}"
+        f"{opened.path}: has no header, and what its {len(columns)} columns hold ({'; '.join(ranges)}) is not clear; "
+        "expected them declared by number, as columns: {time: {name: 1, unit: s}, gyro: {names: [2, 3, 4], "
+        "unit: rad/s}, accel: {names: [5, 6, 7], unit: m/s^2}}"
     )
+
+
+def _range(column: Array) -> str:
+    known = column[np.isfinite(column)]
+    return f"from {known.min():.6g} to {known.max():.6g}" if len(known) else "empty"
 
 
 def _groups(columns: list[Array]) -> tuple[int, list[tuple[int, Any]]] | None:
@@ -131,38 +141,43 @@ def _sensors(columns: list[Array], groups: list[Any], used: set[int], time: _Sta
     stamps = time.guess.of_rows(groups[0]).seconds
     steps = np.diff(stamps)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    forces = []
-    for triple in triples:
-        parts = [np.column_stack([columns[n][rows] for n in triple]) for rows in groups]
+    found: list[tuple[float, Sensors]] = []
+    for accel in triples:
+        parts = [np.column_stack([columns[n][rows] for n in accel]) for rows in groups]
         unit = likely.accel_unit(parts[0], step, parts[1:])
-        if unit is not None and all(_steady(part) for part in parts) and (unit.doubt == "" or _near_range(parts)):
-            size = float(np.median([likely.typical_size(part) for part in parts]))
-            forces.append((abs(np.log(size * _si(unit, step) / 9.8)), triple, unit, parts[0]))
-    for _, accel, unit, force in sorted(forces, key=lambda one: one[0]):
-        beside = [one for one in triples if one[0] in (accel[0] + 3, accel[0] - 3)]
-        rates = [(one, np.column_stack([columns[n][groups[0]] for n in one])) for one in beside]
-        likely_rates = [(one, values) for one, values in rates if _turns(values)]
-        if likely_rates:
-            gyro, values = min(likely_rates, key=lambda one: likely.typical_size(one[1]))
-            return gyro, accel, likely.gyro_unit(values, force, step, unit), unit
-    return None
+        if unit is None or not all(map(_steady, parts)):
+            continue
+        size = float(np.median([likely.typical_size(part) for part in parts]))
+        off = abs(float(np.log(size * _si(unit, step) / STANDARD_GRAVITY)))
+        for gyro in triples:
+            if abs(gyro[0] - accel[0]) != 3:
+                continue
+            rates = np.column_stack([columns[n][groups[0]] for n in gyro])
+            apart = ASKEW * ((min(gyro[0], accel[0]) - _begin(min(gyro[0], accel[0]), used)) % 3 > 0)
+            turning = likely.gyro_unit(rates, parts[0], step, unit)
+            found.append((off + apart + _off_centre(rates), (gyro, accel, turning, unit)))
+    return min(found, key=lambda one: one[0])[1] if found else None
+
+
+def _begin(column: int, used: set[int]) -> int:
+    """Return the first of the columns that lie together with one."""
+    while column > 0 and column - 1 not in used:
+        column -= 1
+    return column
+
+
+def _off_centre(values: Array) -> float:
+    """Return how far, from 0 to 1, vectors are from turn rates, which lie around zero."""
+    middle = np.nanmedian(values, axis=0)
+    spread = float(np.nanquantile(np.linalg.norm(values - middle, axis=1), 0.9))
+    return min(1.0, float(np.linalg.norm(middle)) / (CENTRED * spread)) if spread > 0.0 else 1.0
 
 
 def _si(unit: Likely, step: float) -> float:
-    return unit.scale * {"m/s^2": 1.0, "g": 9.80665, "m/s": 1.0 / step if step else np.nan}[unit.unit]
+    return unit.scale * {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "m/s": 1.0 / step if step else np.nan}[unit.unit]
 
 
 def _steady(vectors: Array) -> bool:
     sizes = np.linalg.norm(vectors, axis=1)
     low, middle, high = np.nanquantile(sizes, [0.25, 0.5, 0.75])
     return bool(middle > 0.0 and (high - low) < STEADY * middle)
-
-
-def _near_range(parts: list[Array]) -> bool:
-    return float(np.median([likely.typical_size(part) for part in parts])) < 2.0**15
-
-
-def _turns(values: Array) -> bool:
-    """Whether vectors are turn rates rather than a field: at rest they are small beside what they are in motion."""
-    sizes = np.linalg.norm(values, axis=1)
-    return bool(np.isfinite(sizes).all() and (not _steady(values) or likely.quietest(values, 0.0) < np.median(sizes)))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from polyins.checks.faults import clipped
 from polyins.checks.stream_checks import FARTHEST_OFF_AXIS_M, GAP_INTERVALS, WHEEL_RATE_RAD_S, check_imu, check_track
 from polyins.errors import InputError
 from polyins.files import find
@@ -112,6 +113,7 @@ def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
     try:
         if isinstance(stream, ImuRows):
             found = check_imu(stream, WHEEL_RATE_RAD_S, FARTHEST_OFF_AXIS_M)
+            found = (*found, *clipped(stream, "", 0.0, gyro=stream.gyro_range_deg_s is None))
         else:
             found = check_track(stream, "positions")
     except InputError as error:

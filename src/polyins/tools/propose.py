@@ -17,7 +17,7 @@ from polyins.files import find
 from polyins.formats.columns import open_table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
-from polyins.formats.rows import ImuRows, SensorRows, Track
+from polyins.formats.rows import ImuRows, SensorRows, Track, intervals
 from polyins.model.axes import axes_matrix, right_handed_axes
 from polyins.model.findings import Finding
 from polyins.model.recording import Recording, usual_interval
@@ -32,6 +32,13 @@ from polyins.tools.inspect import describe
 CHECK = "# CHECK:"
 TRACK_FORMATS = {"kf-gins-gnss": "kf-gins"}
 GRADE = "consumer-mems"
+FULL_SCALES_DEG_S = (125.0, 250.0, 300.0, 400.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0)
+NEAR_FULL_SCALE = 0.0025
+FEWEST_AT_FULL_SCALE = 5
+LEFT_OUT_THERE = "rows there are left out"
+STILL_RAD_S = 0.1
+FAST_RAD_S = 1.0
+"""of the mean rate, above which the force tells what is down at rest only"""
 FEWEST_SHAKEN = 100
 """rows that tell how much they shake"""
 MEDIAN_TO_STD = 1.4826
@@ -115,6 +122,19 @@ def settings_of(paths: Sequence[Path]) -> Settings:
     text = propose([find(path).resolve() for path in paths])
     document = as_document(find(paths[0]), text)
     return loading.located(document), Document(document.path, document.values), tuple(assumptions(text))
+
+
+def check_proposal(text: str, paths: Sequence[str | Path], out: Path | None) -> None:
+    """Raise InputError if the configuration that is proposed would be refused.
+
+    `out`: where it will be written, from whose folder its names count.
+    """
+    document = as_document((out or Path("proposed.yaml")).resolve(), text)
+    try:
+        loading.build(loading.located(document), document)
+    except InputError as error:
+        files = ", ".join(str(path) for path in paths)
+        raise InputError(f"{files}: cannot be navigated with as they are: {error}") from error
 
 
 def doubted(recording: Recording | LongRecording, assumed: Sequence[str]) -> Recording | LongRecording:
@@ -217,12 +237,36 @@ def _imu_lines(number: int, imu: LogSource, first: LogSource, speeds: list[LogSo
         lines.append(f"    rate_hz: {rate:.6g}  {CHECK} {repeated} stamp(s) repeat, so rows are counted")
     if number > 1 and imu.log is None and imu.path != first.path:
         lines.append(f"    clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s")
+    full = full_scale(imu.rows)
+    if full is not None:
+        lines.append(f"    gyro_range_deg_s: {full:.6g}  {CHECK} where the values of the gyro end, so {LEFT_OUT_THERE}")
     return [
         *lines,
         *_axes_lines(imu, facts, speeds),
         f"    position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
         _noise_line(imu.rows),
     ]
+
+
+def full_scale(rows: ImuRows) -> float | None:
+    """Return the full scale of a gyro, deg/s, whose largest value is one that is usual and often there; else None."""
+    if rows.gyro_range_deg_s is not None or len(rows.time) < FEWEST_SHAKEN:
+        return None
+    rates = np.abs(rows.dtheta / intervals(rows.time)[:, None]) / DEG
+    largest = float(np.nanmax(rates))
+    usual = any(abs(largest / scale - 1.0) < NEAR_FULL_SCALE for scale in FULL_SCALES_DEG_S)
+    return largest if usual and int((rates > largest * (1.0 - 1e-6)).sum()) >= FEWEST_AT_FULL_SCALE else None
+
+
+def resting_force(rows: ImuRows) -> np.ndarray | None:
+    """Return the mean specific force, m/s^2, of the rows that hardly turn, if the others turn fast; else None."""
+    steps = intervals(rows.time)[:, None]
+    rate = np.linalg.norm(rows.dtheta / steps, axis=1)
+    still = rate < STILL_RAD_S
+    if not still.sum() >= FEWEST_SHAKEN or float(np.nanmean(rate)) < FAST_RAD_S:
+        return None
+    force: np.ndarray = np.asarray(np.nanmean((rows.dvel / steps)[still], axis=0))
+    return force
 
 
 def _noise_line(rows: ImuRows) -> str:
@@ -261,6 +305,8 @@ def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) 
     if imu.log is not None and imu.log.upright:
         return ["    axes: [x, y, z]  # forward, right, down, as the format has them"]
     force = np.array(facts["accel_mean_m_s2"] or [0.0, 0.0, -9.8], dtype=float)
+    if isinstance(imu.rows, ImuRows) and (still := resting_force(imu.rows)) is not None:
+        force = still
     axes = upright_axes(("x", "y", "z"), force)
     mean = ", ".join(f"{value:.1f}" for value in force)
     forward = FORWARD_IS_A_GUESS
