@@ -154,6 +154,8 @@ class StdColumns(Section):
     """in the order of the value's frame (north, east, height with latitude-longitude-height), m or m/s"""
     scale: PositiveSpread = ONE
     """of whole numbers: how much of the unit one is"""
+    variances: bool = False
+    """they hold variances, m^2 or m^2/s^2"""
 
 
 class VelocityColumns(Section):
@@ -205,6 +207,9 @@ class TrackColumns(Section):
     """which rows are used; all unless given"""
     only: RowsOf | None = None
     """the rows of this receiver, or of a kind of fix"""
+    changed: bool = False
+    """use a row only where its position is there and is another than before: positions of a receiver in the rows of an
+    IMU"""
     valid: Column | None = None
     """a column that is 0 where a row is not to be used"""
     position: PositionColumns

@@ -121,9 +121,9 @@ def data_format(path: str | Path) -> str:
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
         return _xsens(path, lines)
-    if (lines[0].startswith("%") and any(re.search("latitude|-ecef|baseline", line) for line in lines)) or has_rows(
-        rows
-    ):
+    if (
+        lines[0].startswith("%") and any(re.search(r"latitude\(|-ecef\(|-baseline\(", line) for line in lines)
+    ) or has_rows(rows):
         return "rtklib-pos"
     if _are_many_rows(content):
         return _rows_of_numbers(content) or "table"

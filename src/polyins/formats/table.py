@@ -198,6 +198,9 @@ def track_of(table: OpenTable, columns: TrackColumns) -> Track:
     values = table.numbers(wanted)
     found = {name: np.column_stack(values[3 * n : 3 * n + 3]) for n, name in enumerate(given)}
     for name, group in given.items():
+        if getattr(group, "variances", False):
+            with np.errstate(invalid="ignore"):
+                found[name] = np.sqrt(found[name])
         if (scale := getattr(group, "scale", (1.0, 1.0, 1.0))) != (1.0, 1.0, 1.0):
             found[name] = found[name] * scale
     if columns.position.undulation is not None:
@@ -224,9 +227,18 @@ def _used(track: Track, columns: TrackColumns, table: OpenTable) -> Track:
         kept = kept[columns.rows.first - 1 :: columns.rows.every]
     if columns.only is not None:
         kept = np.intersect1d(kept, _rows_of(table, columns.only, len(track.time)))
+    if columns.changed:
+        kept = kept[_changes(track.position[kept])]
     if columns.valid is not None:
         kept = kept[table.numbers([columns.valid])[0][kept] != 0.0]
     return track if len(kept) == len(track.time) else track.at_rows(kept)
+
+
+def _changes(position: Array) -> NDArray[np.intp]:
+    """Return the rows, from 0, of shape (M, 3), that hold a position other than the one before, and not 0, 0."""
+    there = np.flatnonzero(np.isfinite(position).all(axis=1) & (position[:, :2] != 0.0).any(axis=1))
+    moved = np.any(np.diff(position[there], axis=0, prepend=np.nan) != 0.0, axis=1)
+    return there[moved]
 
 
 def written_columns(path: str | Path) -> TrackColumns:

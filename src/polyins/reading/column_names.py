@@ -54,11 +54,11 @@ LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "dm": 0.1}
 SPEEDS = {"ms": 1.0, "mps": 1.0, "mms": 1e-3, "cms": 1e-2, "kmh": 1 / 3.6, "kph": 1 / 3.6, "ms1": 1.0}
 
 TIME = (
-    r"(sample_?)?time(_?stamp|_?fine)?|t|stamp|timestamp|tow|i_tow|gps_?(time|tow)|sec(ond)?s?(_?of_?week)?|sow"
+    r"(sample_?)?time(_?stamp|_?fine|_boot)?|t|stamp|timestamp|tow|i_tow|gps_?(time|tow)|sec(ond)?s?(_?of_?week)?|sow"
     r"|time_of_week|seconds_elapsed|elapsed|millis|milliseconds|ms|micros|microseconds|us|usec|nanoseconds|ns"
-    r"|date|date_?time|utc|utc_?time|ticks?|epoch"
+    r"|date|date_?time|utc|utc_?time|ticks?|epoch|zeit|zeitstempel"
 )
-TIME_BEHIND = r"time|time_?stamp|stamp|tow|time_usec|time_us|time_ms|date_?time"
+TIME_BEHIND = r"time|time_?stamp|stamp|tow|time_usec|time_us|time_ms|time_s|date_?time"
 """may have words before it"""
 NUMBER = (
     r"(imu|sensor|device|dev|node|unit|chip|board|module|channel|instance)(_?(id|no|nr|num|number|index|name|tag))?"
@@ -89,6 +89,8 @@ VELOCITY_STD = tuple(
     rf"{STD_WORDS}_?v_?({a})|{STD_WORDS}_({b})_(vel|velocity)"
     for a, b in (("n", "north"), ("e", "east"), ("d|u", "down|up"))
 )
+VARIANCES = tuple(rf"(.*_)?position_covariance_?{place}" for place in (4, 0, 8))
+"""north, east, up of NavSatFix, whose order is east, north, up"""
 HORIZONTAL_STD = r"h_?acc|horizontal_?(accuracy|acc)|eph"
 VERTICAL_STD = r"v_?acc|vertical_?(accuracy|acc)|epv"
 SPEED_STD = r"s_?acc|speed_?(accuracy|acc)|s_variance(_m_s)?"

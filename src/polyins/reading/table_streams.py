@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -66,7 +66,7 @@ class HalfImu:
 def streams_of(opened: OpenTable) -> list[TableStream] | HalfImu:
     """Return the streams of a table with names; raise InputError if the names say nothing."""
     time = time_column(opened)
-    axes = {name: axis for name in opened.names if name and (axis := sensor_axis(name)) is not None}
+    axes = _axes(opened.names)
     pairs = _pairs(axes)
     found: list[TableStream] = []
     if time is not None and pairs:
@@ -75,7 +75,7 @@ def streams_of(opened: OpenTable) -> list[TableStream] | HalfImu:
         found.append(rows)
     elif time is not None and (half := _half(opened, time, axes)) is not None:
         return half
-    if time is not None and not found and (track := _track(opened, time)) is not None:
+    if time is not None and (track := _track(opened, time, beside=bool(found))) is not None:
         found.append(track)
     if not found:
         raise InputError(
@@ -84,6 +84,14 @@ def streams_of(opened: OpenTable) -> list[TableStream] | HalfImu:
             "declare them as columns)"
         )
     return found
+
+
+def _axes(names: Sequence[str]) -> dict[str, SensorAxis]:
+    """Return which axes columns are; a linear acceleration beside a plain one is that without gravity."""
+    axes = {name: axis for name in names if name and (axis := sensor_axis(name)) is not None}
+    forces = [name for name, axis in axes.items() if axis.what == "accel"]
+    linear = {name for name in forces if "linear" in name.lower()}
+    return {name: axis for name, axis in axes.items() if name not in linear or len(linear) == len(forces)}
 
 
 Three = tuple[str, str, str]
@@ -157,6 +165,8 @@ def _imu(opened: OpenTable, time: TimeGuess, of: _Sensors, only: dict[str, Any] 
             f"{opened.path}: columns {', '.join(of.accel[0])} are {size:.4g} in the middle, which is 1 g in no unit; "
             "expected specific force (is gravity taken out?), else declare columns with unit and scale"
         )
+    if accel.doubt and said.parsed(of.accel[0][0]).plain == "xacc":
+        accel, of = replace(accel, unit="g", scale=1e-3), replace(of, gyro=(of.gyro[0], "mrads"))  # as MAVLink has them
     gyro = _stated(of.gyro[1], said.GYRO_UNITS) or (
         Likely("rad") if of.increments else likely.gyro_unit(of.rates[there[0]], of.force[there[1]], step, accel)
     )
@@ -312,12 +322,17 @@ def joined(gyro: HalfImu, accel: HalfImu) -> dict[str, Any]:
     }
 
 
-def _track(opened: OpenTable, time: TimeGuess) -> TableStream | None:
-    """Return the positions of a table, with the velocity, attitude and standard deviations that stand beside them."""
-    time = time.at_rates(FIX_RATES_HZ)
+def _track(opened: OpenTable, time: TimeGuess, *, beside: bool) -> TableStream | None:
+    """Return the positions of a table, with the velocity, attitude and standard deviations that stand beside them.
+
+    `beside`: the rows are those of an IMU, and most repeat the position of the one before, or have none.
+    """
+    time = time if beside else time.at_rates(FIX_RATES_HZ)
     latitude, longitude = (named(opened.names, one, "deg|rad|1e7|e7") for one in (said.LATITUDE, said.LONGITUDE))
     if latitude and longitude:
-        return _geodetic(opened, time, latitude[0], longitude[0])
+        return _geodetic(opened, time, latitude[0], longitude[0], beside=beside)
+    if beside:
+        return None
     for frame, patterns in said.LOCAL.items():
         names = first_of_each(opened.names, patterns, "m")
         if names is not None:
@@ -339,7 +354,7 @@ def height_column(names: Sequence[str]) -> tuple[str, str] | None:
     return None
 
 
-def _geodetic(opened: OpenTable, time: TimeGuess, latitude: str, longitude: str) -> TableStream | None:
+def _geodetic(opened: OpenTable, time: TimeGuess, latitude: str, longitude: str, *, beside: bool) -> TableStream | None:
     height = height_column(opened.names)
     if height is None:
         return None
@@ -354,6 +369,8 @@ def _geodetic(opened: OpenTable, time: TimeGuess, latitude: str, longitude: str)
         position["unit"] = "rad"
     if (angle, length) != (1.0, 1.0):
         position["scale"] = [angle, angle, length]
+    if first_of_each(opened.names, said.VARIANCES):
+        datum = "ellipsoid"  # by the definition of NavSatFix
     undulation = named(opened.names, said.UNDULATION, "m")
     if undulation and datum != "ellipsoid":
         position["undulation"] = undulation[0]
@@ -365,6 +382,8 @@ def _geodetic(opened: OpenTable, time: TimeGuess, latitude: str, longitude: str)
         what = "is above the sea" if datum == "sea" else "may be above the sea or above the ellipsoid"
         checks.append(f"{DATUM}: {name} {what}")
     declared = {"time": time.column, "position": position, **_fixes_only(opened)}
+    if beside:
+        declared["changed"] = True
     return _with_the_rest(opened, declared, scaled, whole=whole, checks=checks)
 
 
@@ -390,8 +409,11 @@ def _with_the_rest(
     horizontal, vertical = (named(names, one, "m|mm|cm") for one in (said.HORIZONTAL_STD, said.VERTICAL_STD))
     if std is None and horizontal and vertical:
         std = [horizontal[0], horizontal[0], vertical[0]]
+    variances = first_of_each(names, said.VARIANCES)
     if std is not None:
         declared["std"] = {"names": std} | _length(opened, std, whole)
+    elif variances is not None:
+        declared["std"] = {"names": variances, "variances": True}
     for frame, patterns in said.VELOCITY.items():
         velocity = first_of_each(names, patterns, "m_s|cm_s|mm_s|km_h")
         if velocity is not None:

@@ -17,12 +17,12 @@ from polyins.formats.stamps import SECONDS, seconds_of_date, stamps, unwrapped
 from polyins.model.recording import Array
 from polyins.reading import column_names as said
 from polyins.reading import likely_units as likely
-from polyins.reading.column_names import named, parsed
+from polyins.reading.column_names import named, parsed, sensor_axis
 
 RANGES = (604800.0, 604800e3, 2.0**16, 2.0**24, 2.0**31, 2.0**32, 2.0**31 / 1000, 2.0**32 / 1000, 60.0, 3600.0, 1e9)
 """counts at which counters start again; those of seconds with fractions among them"""
-NEAR_END = 0.05
-"""of its range: where a counter is before and after it starts again"""
+FIRST_COLUMNS = 3
+LEAST_ROWS = 20
 RATES_HZ = (likely.SLOWEST_FIX_HZ, likely.LIKELY_RATES_HZ[1])
 SECONDS_NAME = r"(?P<of>.*?)(seconds|secs|sec|s)"
 
@@ -67,6 +67,19 @@ def time_column(opened: OpenTable) -> TimeGuess | None:
         found = guessed(name, counts)
         if len(counts) < 2 or (np.diff(found.seconds) > 0.0).any():
             return found
+    return _unnamed(opened)
+
+
+def _unnamed(opened: OpenTable) -> TimeGuess | None:
+    """Return one of the first columns as stamps if its numbers rise evenly, whatever it is called."""
+    for name in [name for name in opened.names[:FIRST_COLUMNS] if name]:
+        counts = _numbers(opened, name)
+        if counts is None or len(counts) < LEAST_ROWS or sensor_axis(name) is not None:
+            continue
+        found = guessed(name, counts)
+        steps = np.diff(found.seconds)
+        if (steps > 0.0).all() and np.median(np.abs(steps - np.median(steps))) < 0.2 * np.median(steps):
+            return replace(found, doubt=f"the stamps are taken to be in {name}, which rises evenly")
     return None
 
 

@@ -25,6 +25,8 @@ STEADY = 0.35
 LEAST_ROWS = 20
 ASKEW = 0.3
 """against threes that do not begin where columns begin"""
+UNLIKE = 0.2
+"""against the logarithm of how the noise of three axes differs"""
 CENTRED = 300.0
 """times the spread of turn rates their mean may be"""
 NO_HEADER = "without a header, the columns are told by their values"
@@ -155,7 +157,8 @@ def _sensors(columns: list[Array], groups: list[Any], used: set[int], time: _Sta
             rates = np.column_stack([columns[n][groups[0]] for n in gyro])
             apart = ASKEW * ((min(gyro[0], accel[0]) - _begin(min(gyro[0], accel[0]), used)) % 3 > 0)
             turning = likely.gyro_unit(rates, parts[0], step, unit)
-            found.append((off + apart + _off_centre(rates), (gyro, accel, turning, unit)))
+            unlike = _unlike(rates) + _unlike(parts[0])
+            found.append((off + apart + unlike + _off_centre(rates), (gyro, accel, turning, unit)))
     return min(found, key=lambda one: one[0])[1] if found else None
 
 
@@ -164,6 +167,12 @@ def _begin(column: int, used: set[int]) -> int:
     while column > 0 and column - 1 not in used:
         column -= 1
     return column
+
+
+def _unlike(values: Array) -> float:
+    """Return how far three axes, shape (T, 3), are from the same noise, as those of one sensor have, from 0 to 1."""
+    noise = np.nanstd(np.diff(values, 2, axis=0), axis=0)
+    return 1.0 if not noise.min() > 0.0 else min(1.0, UNLIKE * float(np.log(noise.max() / noise.min())))
 
 
 def _off_centre(values: Array) -> float:
