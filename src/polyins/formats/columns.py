@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,8 @@ Column = str | int
 PARQUET_MAGIC = b"PAR1"
 PIECE_ROWS = max(16_384, USUAL_OF + 1)
 """of a Parquet file read in order"""
+LARGE_BYTES = 1 << 23
+"""of a text that is parsed by several threads"""
 PIECE_BYTES = 1 << 21
 """of a text read in order"""
 BUFFER_BYTES = 1 << 16
@@ -176,7 +178,7 @@ def _whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> t
         begin = content.index(b"\n", begin) + 1
     cut = list(table.cut)
     end = cut_end(content, table, begin)
-    if end < len(content.rstrip()):
+    if end < len(content):
         cut.append(ahead + content.count(b"\n", 0, end) + 1)
     named = " and ".join(str(line) for line in cut)
     lines = f"line {named} is" if len(cut) == 1 else f"lines {named} are"
@@ -189,10 +191,21 @@ def _tidy(content: bytes, table: Dialect) -> bytes:
         content = content.decode(errors="replace").encode()
     if table.decimal_comma:
         content = content.replace(b",", b".")
-    if table.delimiter == " ":
-        content = re.sub(rb"(?m)^[ \t]+|[ \t]+$", b"", content)
-        content = re.sub(rb"[ \t]+", b" ", content)
-    return content
+    return _one_blank(content) if table.delimiter == " " else content
+
+
+def _one_blank(content: bytes) -> bytes:
+    """Return a text with one blank between columns, none before the first and behind the last."""
+    letters = np.frombuffer(content, np.uint8)
+    word = letters > ord(" ")
+    kept = word | (letters == ord("\n"))
+    kept[:-1] |= ~kept[:-1] & word[1:]
+    packed = letters[kept]
+    blank = (packed <= ord(" ")) & (packed != ord("\n"))
+    packed[blank] = ord(" ")
+    leading = blank[1:] & (packed[:-1] == ord("\n"))
+    leading = np.concatenate([blank[:1], leading])
+    return bytes(packed[~leading] if leading.any() else packed)
 
 
 def _place(path: Path, names: Sequence[str], column: Column) -> int:
@@ -257,17 +270,24 @@ def _parse(
     messages: list[int] = []
     names = [str(number) for number in range(table.width)]
     wanted = [str(place) for place in places]
-    try:
-        parsed = csv.read_csv(
+    convert = csv.ConvertOptions(
+        include_columns=sorted(set(wanted)), column_types=dict.fromkeys(wanted, kind), strings_can_be_null=False
+    )
+
+    def read(handler: Any, threads: bool) -> Any:
+        return csv.read_csv(
             BufferReader(content),
-            csv.ReadOptions(column_names=names, use_threads=False),
-            csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=other),
-            csv.ConvertOptions(
-                include_columns=sorted(set(wanted)),
-                column_types=dict.fromkeys(wanted, kind),
-                strings_can_be_null=False,
-            ),
+            csv.ReadOptions(column_names=names, use_threads=threads),
+            csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=handler),
+            convert,
         )
+
+    if len(content) > LARGE_BYTES:
+        with suppress(ArrowInvalid):  # by threads, which know no row by its number
+            parsed = read(None, True)
+            return source, [parsed[name] for name in wanted]
+    try:
+        parsed = read(other, False)
     except ArrowInvalid as error:
         if bad:
             raise InputError(bad[0]) from error

@@ -191,7 +191,8 @@ def cut_end(content: bytes, table: Dialect, first: int) -> int:
     `first`: where the rows begin. A line is cut if it has fewer columns than the many before it, or if it lacks the
     end of a line and has fewer digits than they all.
     """
-    end = len(content.rstrip())
+    tail = content[-HEAD_BYTES:]
+    end = len(content) - len(tail) + len(tail.rstrip())
     begin = content.rfind(b"\n", 0, end) + 1
     if begin <= first:
         return len(content)

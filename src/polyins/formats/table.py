@@ -54,8 +54,8 @@ def imu_of(table: OpenTable, columns: ImuColumns, rate_hz: float | None = None) 
     """Return the rows of the IMU whose columns are declared, of a table that is open, as `read_imu` does."""
     if columns.accel.apart and columns.time is not None:
         return _merged(table, columns, columns.time)
-    cells = imu_cells(columns)[:6]
-    values = table.numbers(cells)
+    plain = columns.time is None or columns.time.dates
+    values = table.numbers(imu_cells(columns, rate_hz)[: 6 if plain else 7])[:6]
     time = None if rate_hz or columns.time is None else stamps(table, columns.time)
     kept = _rows_of(table, columns.only, len(values[0]))
     values = [column[kept] for column in values] if len(kept) < len(values[0]) else values
@@ -195,7 +195,8 @@ def track_of(table: OpenTable, columns: TrackColumns) -> Track:
     }
     given = {name: group for name, group in groups.items() if group is not None}
     wanted: list[Column] = [name for group in given.values() for name in group.names]
-    values = table.numbers(wanted)
+    stamped = [columns.time.name] if columns.time is not None and not columns.time.dates else []
+    values = table.numbers([*wanted, *stamped])[: len(wanted)]
     found = {name: np.column_stack(values[3 * n : 3 * n + 3]) for n, name in enumerate(given)}
     for name, group in given.items():
         if getattr(group, "variances", False):
