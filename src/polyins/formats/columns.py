@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,8 +24,6 @@ Column = str | int
 PARQUET_MAGIC = b"PAR1"
 PIECE_ROWS = max(16_384, USUAL_OF + 1)
 """of a Parquet file read in order"""
-LARGE_BYTES = 1 << 23
-"""of a text that is parsed by several threads"""
 PIECE_BYTES = 1 << 21
 """of a text read in order"""
 BUFFER_BYTES = 1 << 16
@@ -229,7 +226,10 @@ def _text_columns(
     from pyarrow import ArrowInvalid, binary, float64
 
     try:
-        source, columns = _parse(source, content, table, places, float64())
+        try:
+            source, columns = _parse(source, content, table, places, float64(), empty=("",))
+        except ArrowInvalid:
+            source, columns = _parse(source, content, table, places, float64())
     except ArrowInvalid:
         source, content = _without_words(source, content, table)
         source, cells = _parse(source, content, table, places, binary())
@@ -250,9 +250,11 @@ def _without_words(source: RowSource, content: bytes, table: Dialect) -> tuple[R
 
 
 def _parse(
-    source: RowSource, content: bytes, table: Dialect, places: list[int], kind: Any
+    source: RowSource, content: bytes, table: Dialect, places: list[int], kind: Any, empty: Sequence[str] | None = None
 ) -> tuple[RowSource, list[Any]]:
     """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them.
+
+    `empty`: what a cell without a value may look like, the fewer the faster; unless given NA, NULL and their like, too.
 
     Messages between the rows are left out. Raises InputError for a row with another number of columns.
     """
@@ -270,24 +272,18 @@ def _parse(
     messages: list[int] = []
     names = [str(number) for number in range(table.width)]
     wanted = [str(place) for place in places]
-    convert = csv.ConvertOptions(
-        include_columns=sorted(set(wanted)), column_types=dict.fromkeys(wanted, kind), strings_can_be_null=False
-    )
-
-    def read(handler: Any, threads: bool) -> Any:
-        return csv.read_csv(
-            BufferReader(content),
-            csv.ReadOptions(column_names=names, use_threads=threads),
-            csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=handler),
-            convert,
-        )
-
-    if len(content) > LARGE_BYTES:
-        with suppress(ArrowInvalid):  # by threads, which know no row by its number
-            parsed = read(None, True)
-            return source, [parsed[name] for name in wanted]
     try:
-        parsed = read(other, False)
+        parsed = csv.read_csv(
+            BufferReader(content),
+            csv.ReadOptions(column_names=names, use_threads=False),
+            csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=other),
+            csv.ConvertOptions(
+                include_columns=sorted(set(wanted)),
+                column_types=dict.fromkeys(wanted, kind),
+                null_values=empty,
+                strings_can_be_null=False,
+            ),
+        )
     except ArrowInvalid as error:
         if bad:
             raise InputError(bad[0]) from error

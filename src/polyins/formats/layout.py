@@ -22,6 +22,7 @@ ENOUGH = 10
 """rows, so that a line that is cut is one of many"""
 DELIMITERS = (",", ";", "\t", " ")
 WITH_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+LIKE_DATE = re.compile(r"\d[\d:/.\-+ T]*[:/\-][\d:/.\-+ T]*\d(Z| ?UTC)?")
 WITH_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 UNIT = re.compile(
     r"[\[(]?(-|s|sec|[mun]s|hz|g|deg|rad|m|(deg|rad|m)(/|_?per_?)s(\^?2|ec)?|m/s/s|m s-2|dps)?[\])]?", re.I
@@ -120,12 +121,12 @@ def is_row(fields: Sequence[str]) -> bool:
 
 
 def _numeric(text: str) -> bool:
-    return is_number(text) or WITH_COMMA.fullmatch(text) is not None
+    return is_number(text) or WITH_COMMA.fullmatch(text) is not None or LIKE_DATE.fullmatch(text) is not None
 
 
 def _rows(lines: list[str]) -> tuple[str, int, int, bool] | None:
     """Return delimiter, number of columns, first row (from 0) and whether commas are decimal; None without rows."""
-    best: tuple[int, str, int, list[int]] | None = None
+    best: tuple[tuple[int, bool, int], str, int, list[int]] | None = None
     for delimiter in DELIMITERS:
         rows: dict[int, list[int]] = {}
         numbers: Counter[int] = Counter()
@@ -135,8 +136,9 @@ def _rows(lines: list[str]) -> tuple[str, int, int, bool] | None:
                 rows.setdefault(len(fields), []).append(number)
                 numbers[len(fields)] += sum(1 if _numeric(text) else -1 for text in fields if text)
         for width, count in numbers.most_common(1):
-            if best is None or count > best[0]:
-                best = count, delimiter, width, rows[width]
+            worth = count, width > 1, -width  # of as many numbers the fewer empty cells
+            if best is None or worth > best[0]:
+                best = worth, delimiter, width, rows[width]
     if best is None:
         return None
     _, delimiter, width, found = best
