@@ -50,7 +50,7 @@ class TextTable:
         self.path = find(path)
         self._dialect = layout(path, content, header_has)
         self.names = self._dialect.names
-        self._content, warnings = _whole_rows(self.path, content, self._dialect)
+        self._content, warnings = whole_rows(self.path, content, self._dialect)
         self.source = RowSource(str(self.path), self._dialect.first_line, warnings=warnings)
         self._parsed: dict[int, Array] = {}
 
@@ -144,7 +144,7 @@ def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[
             line, first = table.first_line, table
         else:
             first = replace(table, first_line=1)
-        whole, warnings = _whole_rows(found, content, first, ahead=line - first.first_line)
+        whole, warnings = whole_rows(found, content, first, ahead=line - first.first_line)
         source = RowSource(str(found), line, warnings=warnings)
         source, _, values = _text_columns(source, whole, table, places, False)
         yield source, values
@@ -165,7 +165,7 @@ def _whole_lines(path: Path) -> Iterator[bytes]:
             yield rest
 
 
-def _whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tuple[bytes, tuple[str, ...]]:
+def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tuple[bytes, tuple[str, ...]]:
     """Return the lines from the first row on as the parser takes them, and warnings of lines that are cut off.
 
     `ahead`: lines of the file before the content.

@@ -16,7 +16,7 @@ from polyins.formats.columns import Column
 from polyins.formats.recognize import imu_format
 from polyins.formats.rows import ImuRows, RowSource
 from polyins.formats.stamps import seconds_per_count
-from polyins.model.findings import Finding
+from polyins.model.findings import LEFT_OUT, Finding
 from polyins.model.recording import Array, ImuStream, usual_interval
 from polyins.prepare.timesync import gaps_of
 from polyins.reading.imu_stream import in_array_axes, measured
@@ -93,7 +93,8 @@ class ImuFile:
             row = (0 if source.first_line else done) - known
             good, found = measured(rows, self.entry, alone=self.alone, first_row=row)
             fresh = _after(good, last)
-            yield fresh, found if len(fresh.time) < len(rows.time) - known else ()
+            lines = tuple(Finding(LEFT_OUT, text, stream=self.entry.name) for text in source.warnings)
+            yield fresh, (*lines, *(found if len(fresh.time) < len(rows.time) - known else ()))
             done, last = done + len(rows.time) - known, fresh.time[-1] if len(fresh.time) else last
             before = [column[-CONTEXT:] for column in whole]
 
