@@ -521,6 +521,8 @@ CONFIGURATION: dict[str, type[BaseModel]] = {
     "reference": config.ReferenceEntry,
     "columns of positions": config.TrackColumns,
     "columns.time": columns.TimeColumn,
+    "columns.time.fine": columns.FineTime,
+    "columns.only, columns.gyro.only, columns.accel.only": columns.RowsOf,
     "columns.position": columns.PositionColumns,
     "columns.std, columns.velocity_std": columns.StdColumns,
     "columns.velocity": columns.VelocityColumns,

@@ -590,12 +590,13 @@ def export(solution: Path, target: Path, to: str, method: str | None, columns: s
 def init(files: tuple[Path, ...], out: Path | None) -> None:
     """Look at recordings and write a commented configuration for them."""
     from polyins.files import write_bytes
-    from polyins.tools.propose import propose
+    from polyins.tools.propose import check_proposal, propose
 
     if out is not None and out.parent.resolve() != Path.cwd():
         # names in a configuration count from its own folder
         files = tuple(file.resolve() for file in files)
     text = propose(files)
+    check_proposal(text, files, out)
     if out is None:
         click.echo(text)
     elif out.exists():

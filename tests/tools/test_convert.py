@@ -205,13 +205,11 @@ def test_what_exists_stays(tmp_path: Path) -> None:
         ("drive.yaml", "out.csv", r"drive\.yaml: looks like a configuration; expected IMU data or positions"),
         ("words.txt", "out.csv", r"words\.txt: is of no known format"),
         ("odd.csv", "out.csv", r"odd\.csv: columns a, b, c, d are of no known meaning"),
-        ("rates.txt", "out.bin", r"values look like rates"),
         ("nowhere.txt", "out.bin", r"nowhere\.txt: no such file"),
     ],
 )
 def test_what_cannot_be_converted(source: str, target: str, message: str, tmp_path: Path) -> None:
     write_rows(tmp_path / "imu.txt", as_increments(still_imu()))
-    write_rows(tmp_path / "rates.txt", still_imu())
     write_rows(tmp_path / "gnss.txt", fixes())
     (tmp_path / "truth.nav").write_text("0 1.0 30 114 20 1 2 3 4 5 6\n")
     (tmp_path / "drive.yaml").write_text("imus:\n  - file: imu.txt\n")
@@ -220,3 +218,11 @@ def test_what_cannot_be_converted(source: str, target: str, message: str, tmp_pa
     with pytest.raises(InputError, match=message):
         convert(tmp_path / source, tmp_path / target)
     assert not (tmp_path / target).exists()
+
+
+def test_rates_without_header_become_increments(tmp_path: Path) -> None:
+    warnings = convert(write_rows(tmp_path / "rates.txt", still_imu()), tmp_path / "out.txt")
+    assert any("columns are told by their values" in text for text in warnings)
+    np.testing.assert_allclose(
+        kf_gins.read_imu(tmp_path / "out.txt").dvel, as_increments(still_imu())[:, 4:], atol=1e-9
+    )

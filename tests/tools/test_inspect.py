@@ -37,9 +37,11 @@ def test_spoilt_data_are_described_not_refused(tmp_path: Path) -> None:
     json.dumps(facts, allow_nan=False)
 
 
-def test_rates_in_a_file_of_increments_are_a_problem(tmp_path: Path) -> None:
-    (problem,) = inspect(write_rows(tmp_path / "imu.txt", still_imu()))["problems"]
-    assert "values look like rates" in problem
+def test_rates_without_header_are_rates(tmp_path: Path) -> None:
+    facts = inspect(write_rows(tmp_path / "imu.txt", still_imu()))
+    assert (facts["format"], facts["problems"]) == ("table", [])
+    assert facts["units"] == {"gyro": "rad/s", "accel": "m/s^2"}
+    assert facts["accel_mean_m_s2"] == pytest.approx([0.02, -0.01, -9.80665])
 
 
 def test_positions(tmp_path: Path) -> None:

@@ -106,10 +106,10 @@ def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) ->
             continue
         value = f"{np.degrees(largest):.4g} deg/s" if k < 3 else f"{largest:.4g} m/s^2"
         remedy = "; gyro_range_deg_s leaves such rows out" if k < 3 else ""
+        imu = f"IMU {name}" if name else "the IMU"
         texts.append(
-            f"{rows.source.path}: {NAMES[k]} of IMU {name} stays at exactly {value}, its largest value, "
-            f"{len(runs)} time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its "
-            f"range?{remedy}"
+            f"{rows.source.path}: {NAMES[k]} of {imu} stays at exactly {value}, its largest value, {len(runs)} "
+            f"time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its range?{remedy}"
         )
     return tuple(texts)
 
@@ -141,7 +141,7 @@ def _zeros(rows: ImuRows) -> NDArray[np.bool_]:
 def _frozen(rows: ImuRows) -> NDArray[np.bool_]:
     """Return which rows repeat those before them for longer than a chip's own samples do."""
     rates = _rates(rows)
-    equal = (np.diff(rows.dtheta, axis=0) == 0.0).all(axis=1) & (np.diff(rows.dvel, axis=0) == 0.0).all(axis=1)
+    equal = np.logical_and.reduce([np.diff(column) == 0.0 for column in (*rows.dtheta.T, *rows.dvel.T)])
     first = _changes(rates)
     first[1:] &= ~equal
     frozen = np.zeros(len(first), dtype=bool)
@@ -158,8 +158,8 @@ def _frozen(rows: ImuRows) -> NDArray[np.bool_]:
 def _changes(rates: Array) -> NDArray[np.bool_]:
     """Return which rows differ from the one before, shape (T,)."""
     largest = np.repeat([max(1.0, float(np.abs(part).max())) for part in np.hsplit(rates, 2)], 3)
-    moved = np.abs(np.diff(rates, axis=0)) > SAME * largest
-    return np.concatenate([[True], moved.any(axis=1)])
+    moved = [np.abs(np.diff(column)) > SAME * most for column, most in zip(rates.T, largest, strict=True)]
+    return np.concatenate([[True], np.logical_or.reduce(moved)])
 
 
 def _is_rough(distinct: Array, order: int, least: float) -> bool:

@@ -38,7 +38,7 @@ def without_nonsense(rows: ImuRows, name: str, clock_offset: float) -> tuple[Imu
 
     `clock_offset`, s, puts the times in them on the recording's clock.
     """
-    numbers = np.isfinite(rows.time) & np.isfinite(rows.dtheta).all(axis=1) & np.isfinite(rows.dvel).all(axis=1)
+    numbers = np.logical_and.reduce([np.isfinite(column) for column in (rows.time, *rows.dtheta.T, *rows.dvel.T)])
     good = numbers.copy()
     good[numbers] = in_order(rows.time[numbers])
     if good.all():
@@ -58,8 +58,8 @@ def within_any_range(
     """Leave out rows whose values no sensor has, as `without_nonsense`; where the unit is wrong they stay."""
     if len(rows.time) < 2:
         return rows, ()
-    steps = intervals(rows.time)[:, None]
-    rate, force = (np.abs(block / steps).max(axis=1) for block in (rows.dtheta, rows.dvel))
+    steps = intervals(rows.time)
+    rate, force = (np.maximum.reduce(list(np.abs(block).T)) / steps for block in (rows.dtheta, rows.dvel))
     fast, hard = rate > limits.rate, force > limits.force
     if not (fast.any() or hard.any()):
         return rows, ()

@@ -10,6 +10,7 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.formats.rows import ImuRows, RowSource, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
+from polyins.model.geodesy import displacement
 from polyins.model.recording import Array, usual_interval
 from polyins.model.rig import STANDARD_GRAVITY
 from polyins.prepare.plausible import BODY, WHEEL
@@ -35,6 +36,11 @@ JITTER = 0.2
 UPRIGHT = 0.5
 """Cosine of the largest angle between up in the array and the mean specific force."""
 MAX_STD_M = 10000.0
+HIGHEST_M = 100000.0
+FASTER_THAN_MOVED = 10.0
+"""times what positions change by are velocities in another unit"""
+LEAST_SPEED_M_S = 5.0
+"""that they show at least, so that those of a receiver at rest may be anything"""
 MOST_OF_A_WEEK_S = 600000.0
 
 
@@ -115,7 +121,29 @@ def check_track(track: Track, what: str) -> tuple[str, ...]:
     check_order(track.source, track.time)
     if track.geodetic:
         _check_coordinates(track)
+    _check_heights_and_speeds(track)
     return track.warnings
+
+
+def _check_heights_and_speeds(track: Track) -> None:
+    """Raise InputError for heights above the air, and for velocities far from what the positions change by."""
+    height = track.position[:, 2]
+    for row in np.flatnonzero(np.abs(height) > HIGHEST_M)[:1]:
+        raise InputError(
+            f"{track.source.place(int(row))}: height is {height[row]:.6g} m; expected at most {HIGHEST_M:g} m: is it "
+            "in mm? (columns.position.scale)"
+        )
+    if track.velocity is None or len(track.time) < 3:
+        return
+    moved = displacement(track.position, track.position[0], True) if track.geodetic else track.position
+    rates = np.linalg.norm(np.diff(moved[:, :2], axis=0), axis=1) / np.diff(track.time)
+    speeds = np.linalg.norm(track.velocity[1:, :2], axis=1)
+    usual, fastest = float(np.median(speeds)), float(np.quantile(rates, 0.9))
+    if usual > FASTER_THAN_MOVED * fastest + LEAST_SPEED_M_S:
+        raise InputError(
+            f"{track.source.path}: velocities are {usual:.4g} m/s in the middle, the positions change by "
+            f"{fastest:.4g} m/s at most; expected m/s (columns.velocity.scale)"
+        )
 
 
 def check_std(source: RowSource, std: Array) -> None:
@@ -244,7 +272,9 @@ def _check_gyro_unit(rows: ImuRows, max_rate: float) -> float:
     rms = float(np.sqrt(np.mean((turn / np.diff(rows.time)) ** 2)))
     largest = int(np.argmax(turn))
     on_wheel = max_rate > MAX_RATE_RAD_S
-    if rows.units_known or ((on_wheel or turn[largest] <= MAX_TURN_RAD) and rms <= max_rate):
+    # degrees mistaken for radians make rates that no gyro has, radians mistaken for degrees make small ones
+    in_degrees = rows.gyro_unit == "deg/s" and rms <= BODY.rate
+    if rows.units_known or ((on_wheel or turn[largest] <= MAX_TURN_RAD) and (rms <= max_rate or in_degrees)):
         return rms
     other = {"rad/s": "deg/s", "rad": "rad/s or deg/s", "deg": "deg/s", "deg/s": "another"}[rows.gyro_unit]
     raise InputError(

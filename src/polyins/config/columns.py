@@ -4,9 +4,39 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from polyins.config.fields import Column, Positive, Section, ThreeColumns, blame
+from polyins.config.fields import Column, PerAxis, Positive, PositiveSpread, Section, ThreeColumns, blame
+
+ONE = (1.0, 1.0, 1.0)
+
+
+def _listed(value: object) -> object:
+    return tuple(value) if isinstance(value, list | tuple) else (value,)
+
+
+class RowsOf(Section):
+    """Which rows of a table belong to a stream, told by a column."""
+
+    name: Column
+    """the column"""
+    equal: Annotated[tuple[int | float | str, ...], BeforeValidator(_listed)]
+    """what stands there: a number, a text, or a list of them"""
+
+
+class FineTime(Section):
+    """The column that holds what a stamp is later than the one of `time` says."""
+
+    name: Column
+    """the column"""
+    unit: Literal["s", "ms", "us", "ns"] = "s"
+    """its unit"""
+    dates: bool = False
+    """it holds times of day, beside a column of days"""
+    tick_s: Positive | None = None
+    """length of one count of a counter, s; takes the place of unit"""
+    ticks_per_s: Column | None = None
+    """the column that says how many counts a second has; takes the place of unit"""
 
 
 class TimeColumn(Section):
@@ -16,6 +46,15 @@ class TimeColumn(Section):
     """the column"""
     unit: Literal["s", "ms", "us", "ns"] = "s"
     """the unit of the stamps"""
+    dates: bool = False
+    """they are dates, which become seconds since 1970 (UTC unless they say otherwise), or times of day, which become
+    seconds since midnight; without unit"""
+    tick_s: Positive | None = None
+    """length of one count of a counter, s; takes the place of unit"""
+    wraps_at: Positive | None = None
+    """the count at which a counter starts again from zero: 4294967296 of 32 bits, 604800 of seconds of the GPS week"""
+    fine: FineTime | None = None
+    """a second column, which is added"""
 
 
 class GyroColumns(Section):
@@ -25,15 +64,35 @@ class GyroColumns(Section):
     """x, y, z in the sensor's axes"""
     unit: Literal["rad/s", "deg/s", "rad", "deg"]
     """rad/s and deg/s are mean rates over the interval that ends at the stamp, rad and deg its increments"""
+    scale: PerAxis = ONE
+    """of raw counts: how much of the unit one is"""
+    only: RowsOf | None = None
+    """those of the gyro, where gyro and accelerometer have rows of their own"""
 
 
 class AccelColumns(Section):
-    """Which columns of a table hold the specific force or velocity increments."""
+    """Which columns of a table hold the specific force or velocity increments.
+
+    With a file, rows or time of its own the accelerometer is brought to the stamps of the gyro.
+    """
 
     names: ThreeColumns
     """x, y, z in the sensor's axes"""
     unit: Literal["m/s^2", "g", "m/s"]
     """m/s^2 and g (9.80665 m/s^2) are mean values over the interval that ends at the stamp, m/s its increments"""
+    scale: PerAxis = ONE
+    """of raw counts: how much of the unit one is"""
+    only: RowsOf | None = None
+    """those of the accelerometer, where it has rows of its own"""
+    file: str = ""
+    """where its data are, if not in the gyro's file"""
+    time: TimeColumn | None = None
+    """its stamps, if they are not the gyro's"""
+
+    @property
+    def apart(self) -> bool:
+        """Whether its values do not stand beside those of the gyro."""
+        return self.only is not None or self.time is not None or bool(self.file)
 
 
 class ImuColumns(Section):
@@ -45,6 +104,18 @@ class ImuColumns(Section):
     """angular rates or angle increments"""
     accel: AccelColumns
     """specific force or velocity increments"""
+    only: RowsOf | None = None
+    """those of this IMU, where there are rows of others"""
+
+    @model_validator(mode="after")
+    def _accelerometer_apart_has_stamps(self) -> Self:
+        if not self.accel.apart:
+            return self
+        if self.time is None:
+            raise blame("time", "is missing; expected it where gyro and accelerometer stand apart")
+        if self.gyro.unit in ("rad", "deg") or self.accel.unit == "m/s":
+            raise blame("accel", "stands apart from the gyro; expected rates rather than increments of both")
+        return self
 
 
 PositionFrame = Literal["latitude-longitude-height", "north-east-down", "north-east-up", "east-north-up"]
@@ -60,6 +131,10 @@ class PositionColumns(Section):
     """what the three are; the last three kinds are metres on a local tangent plane"""
     unit: Literal["deg", "rad", "m"] | None = None
     """of latitude and longitude (deg unless said otherwise; height is always m), or m"""
+    scale: PerAxis = ONE
+    """of whole numbers: how much of the unit one is, as [1e-7, 1e-7, 0.001]"""
+    undulation: Column | None = None
+    """a column with the height of the geoid above the ellipsoid, m, which is added to heights above the sea"""
 
     @model_validator(mode="after")
     def _unit_fits(self) -> Self:
@@ -67,6 +142,8 @@ class PositionColumns(Section):
         if self.unit is not None and geodetic == (self.unit == "m"):
             fitting = "deg or rad" if geodetic else "m"
             raise ValueError(f"unit {self.unit} does not fit frame {self.frame}; expected {fitting}")
+        if self.undulation is not None and not geodetic:
+            raise blame("undulation", f"is given with frame {self.frame}; expected latitude-longitude-height")
         return self
 
 
@@ -75,6 +152,10 @@ class StdColumns(Section):
 
     names: ThreeColumns
     """in the order of the value's frame (north, east, height with latitude-longitude-height), m or m/s"""
+    scale: PositiveSpread = ONE
+    """of whole numbers: how much of the unit one is"""
+    variances: bool = False
+    """they hold variances, m^2 or m^2/s^2"""
 
 
 class VelocityColumns(Section):
@@ -82,6 +163,8 @@ class VelocityColumns(Section):
 
     names: ThreeColumns
     """m/s, in the order of `frame`"""
+    scale: PerAxis = ONE
+    """of whole numbers: how many m/s one is"""
     frame: VectorFrame = "north-east-down"
     """what the three are"""
 
@@ -122,6 +205,11 @@ class TrackColumns(Section):
     """the stamps; may be left out where rows are counted"""
     rows: RowChoice | None = None
     """which rows are used; all unless given"""
+    only: RowsOf | None = None
+    """the rows of this receiver, or of a kind of fix"""
+    changed: bool = False
+    """use a row only where its position is there and is another than before: positions of a receiver in the rows of an
+    IMU"""
     valid: Column | None = None
     """a column that is 0 where a row is not to be used"""
     position: PositionColumns

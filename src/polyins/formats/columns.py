@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.files import find, opened, read_bytes, read_head
 from polyins.formats.arrow_arrays import to_numpy
+from polyins.formats.layout import HEAD_BYTES, Dialect, cut_end, is_message, is_number, layout, split
 from polyins.formats.rows import RowSource
 from polyins.model.recording import USUAL_OF, Array
 
@@ -21,23 +22,12 @@ Column = str | int
 """A column's name, or its number counted from 1."""
 
 PARQUET_MAGIC = b"PAR1"
-HEAD_BYTES = 16384
 PIECE_ROWS = max(16_384, USUAL_OF + 1)
 """of a Parquet file read in order"""
 PIECE_BYTES = 1 << 21
 """of a text read in order"""
 BUFFER_BYTES = 1 << 16
 """of a column; without it a whole row group would be held"""
-
-
-@dataclass(frozen=True)
-class Dialect:
-    """How a text table is built."""
-
-    delimiter: str
-    names: tuple[str, ...]
-    first_line: int
-    """line of the first row, counted from 1"""
 
 
 def is_parquet(path: str | Path) -> bool:
@@ -53,23 +43,89 @@ def column_names(path: str | Path) -> tuple[str, ...]:
     return _parquet_names(path, read_bytes(path) if find(path).suffix == ".gz" else None)
 
 
+class TextTable:
+    """The columns of a text table; a column is parsed once."""
+
+    def __init__(self, path: str | Path, content: bytes, header_has: str = "") -> None:
+        self.path = find(path)
+        self._dialect = layout(path, content, header_has)
+        self.names = self._dialect.names
+        self._content, warnings = whole_rows(self.path, content, self._dialect)
+        self.source = RowSource(str(self.path), self._dialect.first_line, warnings=warnings)
+        self._parsed: dict[int, Array] = {}
+
+    def numbers(self, wanted: Sequence[Column], *, text_is_nan: bool = False) -> list[Array]:
+        """Return columns, each of shape (T,); what is missing in a cell is NaN.
+
+        `text_is_nan`: cells that are not numbers are NaN as well, instead of an error. Raises InputError that names
+        the missing column or the bad line.
+        """
+        places = [_place(self.path, self.names, column) for column in wanted]
+        known = dict(self._parsed)
+        missing = sorted({place for place in places if place not in known})
+        if missing:
+            self.source, self._content, columns = _text_columns(
+                self.source, self._content, self._dialect, missing, text_is_nan
+            )
+            known |= dict(zip(missing, columns, strict=True))
+            self._parsed = self._parsed if text_is_nan else known
+        return [known[place] for place in places]
+
+    def texts(self, column: Column) -> NDArray[np.str_]:
+        """Return a column as it stands there, shape (T,)."""
+        from pyarrow import string
+
+        place = _place(self.path, self.names, column)
+        self.source, (cells,) = _parse(self.source, self._content, self._dialect, [place], string())
+        return np.array([text.strip() for text in cells.to_pylist()], dtype=str)
+
+
+class ParquetTable:
+    """The columns of a Parquet file, as `TextTable` has them; rows have no lines."""
+
+    def __init__(self, path: str | Path, content: bytes | None) -> None:
+        self.path = find(path)
+        self._content = content
+        self.names = _parquet_names(path, content)
+        self.source = RowSource(str(self.path))
+
+    def numbers(self, wanted: Sequence[Column], *, text_is_nan: bool = False) -> list[Array]:
+        """Return columns, each of shape (T,); raises InputError for one that is missing or is text."""
+        return _parquet_columns(self.path, wanted, self._content)
+
+    def texts(self, column: Column) -> NDArray[np.str_]:
+        """Return a column as text, shape (T,)."""
+        from pyarrow import BufferReader, parquet
+
+        (name,) = parquet_places(self.path, [column], self._content)
+        table = parquet.read_table(self.path if self._content is None else BufferReader(self._content), columns=[name])
+        return np.array([str(value) for value in table[name].to_pylist()], dtype=str)
+
+
+OpenTable = TextTable | ParquetTable
+
+
+def open_table(path: str | Path, header_has: str = "") -> OpenTable:
+    """Read a table whose columns are asked for afterwards.
+
+    `header_has`: a name by which the header line is known where other lines come before it. Raises InputError for a
+    file without rows.
+    """
+    if find(path).suffix != ".gz" and is_parquet(path):
+        return ParquetTable(path, None)
+    content = read_bytes(path)
+    if content[:4] == PARQUET_MAGIC:
+        return ParquetTable(path, content)
+    return TextTable(path, content, header_has)
+
+
 def read_columns(
     path: str | Path, wanted: Sequence[Column], *, header_has: str = "", text_is_nan: bool = False
 ) -> tuple[RowSource, list[Array]]:
-    """Read the wanted columns, each of shape (T,); what is missing in a cell is NaN.
-
-    `header_has`: a name by which the header line is known where other lines come before it. `text_is_nan`: cells that
-    are not numbers are NaN instead of an error. Raises InputError that names the missing column or the bad line.
-    """
-    if find(path).suffix != ".gz" and read_head(path, 4) == PARQUET_MAGIC:
-        return RowSource(str(find(path))), _parquet_columns(path, wanted)
-    content = read_bytes(path)
-    if content[:4] == PARQUET_MAGIC:
-        return RowSource(str(find(path))), _parquet_columns(path, wanted, content)
-    table = layout(path, content, header_has)
-    places = [_place(find(path), table.names, column) for column in wanted]
-    values = _text_columns(find(path), _tidy(content, table), table, places, text_is_nan, table.first_line - 1)
-    return RowSource(str(find(path)), table.first_line), values
+    """Read the wanted columns of a table, as `open_table` and `numbers` do."""
+    table = open_table(path, header_has)
+    values = table.numbers(wanted, text_is_nan=text_is_nan)
+    return table.source, values
 
 
 def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[RowSource, list[Array]]]:
@@ -85,11 +141,14 @@ def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[
         if table is None:
             table = layout(path, content)
             places = [_place(found, table.names, column) for column in wanted]
-            lines = content.split(b"\n", table.first_line - 1)
-            content, line = lines[-1], table.first_line
-        piece = replace(table, first_line=line)
-        yield RowSource(str(found), line), _text_columns(found, _tidy(content, piece), piece, places, False, skipped=0)
-        line += content.count(b"\n")
+            line, first = table.first_line, table
+        else:
+            first = replace(table, first_line=1)
+        whole, warnings = whole_rows(found, content, first, ahead=line - first.first_line)
+        source = RowSource(str(found), line, warnings=warnings)
+        source, _, values = _text_columns(source, whole, table, places, False)
+        yield source, values
+        line += content.count(b"\n") - (first.first_line - 1)
 
 
 def _whole_lines(path: Path) -> Iterator[bytes]:
@@ -106,49 +165,44 @@ def _whole_lines(path: Path) -> Iterator[bytes]:
             yield rest
 
 
+def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tuple[bytes, tuple[str, ...]]:
+    """Return the lines from the first row on as the parser takes them, and warnings of lines that are cut off.
+
+    `ahead`: lines of the file before the content.
+    """
+    begin = 0
+    for _ in range(table.first_line - 1):
+        begin = content.index(b"\n", begin) + 1
+    cut = list(table.cut)
+    end = cut_end(content, table, begin)
+    if end < len(content):
+        cut.append(ahead + content.count(b"\n", 0, end) + 1)
+    named = " and ".join(str(line) for line in cut)
+    lines = f"line {named} is" if len(cut) == 1 else f"lines {named} are"
+    return _tidy(content[begin:end], table), (f"{path}: {lines} cut off, and left out",) if cut else ()
+
+
 def _tidy(content: bytes, table: Dialect) -> bytes:
-    """Return the content as the parser takes it: one blank between columns, and UTF-8."""
+    """Return the content as the parser takes it: one blank between columns, points in numbers, and UTF-8."""
     if not content.isascii():
         content = content.decode(errors="replace").encode()
-    if table.delimiter == " ":
-        content = re.sub(rb"(?m)^[ \t]+|[ \t]+$", b"", content)
-        content = re.sub(rb"[ \t]+", b" ", content)
-    return content
+    if table.decimal_comma:
+        content = content.replace(b",", b".")
+    return _one_blank(content) if table.delimiter == " " else content
 
 
-def layout(path: str | Path, content: bytes, header_has: str = "") -> Dialect:
-    """Find delimiter, header and first row of a text table."""
-    lines = content[:HEAD_BYTES].decode("utf-8-sig", errors="replace").splitlines()
-    start = next((n for n, line in enumerate(lines) if header_has in line and not _is_preamble(line)), None)
-    if start is None:
-        raise InputError(f"{find(path)}: no line of column names with {header_has}; expected such a header")
-    first = lines[start]
-    delimiter = next((mark for mark in (",", ";", "\t") if mark in first), " ")
-    fields = _split(first, delimiter)
-    if any(_is_number(text) for text in fields):
-        commented = _split(lines[start - 1].lstrip("#% "), delimiter) if start else []
-        names = commented if len(commented) == len(fields) else [""] * len(fields)
-        return Dialect(delimiter, tuple(names), start + 1)
-    if start + 1 >= len(lines):
-        raise InputError(f"{find(path)}: has a header and no rows; expected data")
-    extra = len(_split(lines[start + 1], delimiter)) - len(fields)
-    return Dialect(delimiter, tuple(fields + [""] * max(extra, 0)), start + 2)
-
-
-def _is_preamble(line: str) -> bool:
-    return not line.strip() or line.startswith(("#", "%", "sep="))
-
-
-def _split(line: str, delimiter: str) -> list[str]:
-    return [text.strip().strip('"') for text in (line.split(delimiter) if delimiter != " " else line.split())]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _one_blank(content: bytes) -> bytes:
+    """Return a text with one blank between columns, none before the first and behind the last."""
+    letters = np.frombuffer(content, np.uint8)
+    word = letters > ord(" ")
+    kept = word | (letters == ord("\n"))
+    kept[:-1] |= ~kept[:-1] & word[1:]
+    packed = letters[kept]
+    blank = (packed <= ord(" ")) & (packed != ord("\n"))
+    packed[blank] = ord(" ")
+    leading = blank[1:] & (packed[:-1] == ord("\n"))
+    leading = np.concatenate([blank[:1], leading])
+    return bytes(packed[~leading] if leading.any() else packed)
 
 
 def _place(path: Path, names: Sequence[str], column: Column) -> int:
@@ -166,41 +220,67 @@ def _place(path: Path, names: Sequence[str], column: Column) -> int:
 
 
 def _text_columns(
-    path: Path, content: bytes, table: Dialect, places: list[int], text_is_nan: bool, skipped: int
-) -> list[Array]:
-    """Return columns of a text; `skipped`: its lines before the first row."""
-    from pyarrow import ArrowInvalid, float64
+    source: RowSource, content: bytes, table: Dialect, places: list[int], text_is_nan: bool
+) -> tuple[RowSource, bytes, list[Array]]:
+    """Return columns of a text that begins with the first row of `source`, and the text without lines that are none."""
+    from pyarrow import ArrowInvalid, binary, float64
 
     try:
-        columns = _parse(path, content, table, places, float64(), skipped)
+        try:
+            source, columns = _parse(source, content, table, places, float64(), empty=("",))
+        except ArrowInvalid:
+            source, columns = _parse(source, content, table, places, float64())
     except ArrowInvalid:
-        from pyarrow import binary
+        source, content = _without_words(source, content, table)
+        source, cells = _parse(source, content, table, places, binary())
+        return source, content, _numbers(source, table, places, cells, text_is_nan)
+    return source, content, [to_numpy(column) for column in columns]
 
-        cells = _parse(path, content, table, places, binary(), skipped)
-        return [_numbers(path, table, place, column, text_is_nan) for place, column in zip(places, cells, strict=True)]
-    return [to_numpy(column) for column in columns]
+
+def _without_words(source: RowSource, content: bytes, table: Dialect) -> tuple[RowSource, bytes]:
+    """Leave out the lines that hold no number: messages, and a header that is there again."""
+    lines = content.splitlines(keepends=True)
+    cells = [split(line.decode(errors="replace"), table.delimiter) for line in lines]
+    kept = [n for n, fields in enumerate(cells) if any(map(is_number, fields)) or not any(fields)]
+    kept = [n for n in kept if len(cells[n]) == table.width or not is_message(cells[n])]
+    if len(kept) == len(lines) or not kept:
+        return source, content
+    source = source.at(np.array(kept)).warned(f"{len(lines) - len(kept)} line(s) between the rows are none of them")
+    return source, b"".join(lines[n] for n in kept)
 
 
-def _parse(path: Path, content: bytes, table: Dialect, places: list[int], kind: Any, skipped: int) -> list[Any]:
-    """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them."""
+def _parse(
+    source: RowSource, content: bytes, table: Dialect, places: list[int], kind: Any, empty: Sequence[str] | None = None
+) -> tuple[RowSource, list[Any]]:
+    """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them.
+
+    `empty`: what a cell without a value may look like, the fewer the faster; unless given NA, NULL and their like, too.
+
+    Messages between the rows are left out. Raises InputError for a row with another number of columns.
+    """
     from pyarrow import ArrowInvalid, BufferReader, csv
 
-    def refuse(row: Any) -> str:
-        line = None if row.number is None else row.number + table.first_line - 1 - skipped
-        bad.append(f"{path}, line {line}: {row.actual_columns} columns; expected {row.expected_columns}")
+    def other(row: Any) -> str:
+        if is_message(split(row.text, table.delimiter)):
+            messages.append(row.number)
+            return "skip"
+        line = None if row.number is None else source.line(row.number - 1)
+        bad.append(f"{source.path}, line {line}: {row.actual_columns} columns; expected {row.expected_columns}")
         return "error"
 
     bad: list[str] = []
-    names = [str(number) for number in range(len(table.names))]
+    messages: list[int] = []
+    names = [str(number) for number in range(table.width)]
     wanted = [str(place) for place in places]
     try:
         parsed = csv.read_csv(
             BufferReader(content),
-            csv.ReadOptions(column_names=names, skip_rows=skipped, use_threads=False),
-            csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=refuse),
+            csv.ReadOptions(column_names=names, use_threads=False),
+            csv.ParseOptions(delimiter=table.delimiter, invalid_row_handler=other),
             csv.ConvertOptions(
                 include_columns=sorted(set(wanted)),
                 column_types=dict.fromkeys(wanted, kind),
+                null_values=empty,
                 strings_can_be_null=False,
             ),
         )
@@ -208,20 +288,26 @@ def _parse(path: Path, content: bytes, table: Dialect, places: list[int], kind: 
         if bad:
             raise InputError(bad[0]) from error
         raise
-    return [parsed[name] for name in wanted]
+    if messages and source.lines is None:
+        rows = np.delete(np.arange(parsed.num_rows + len(messages)), np.array(messages) - 1)
+        source = source.at(rows).warned(f"{len(messages)} line(s) between the rows are none of them")
+    return source, [parsed[name] for name in wanted]
 
 
-def _numbers(path: Path, table: Dialect, place: int, cells: Any, text_is_nan: bool) -> Array:
+def _numbers(source: RowSource, table: Dialect, places: list[int], cells: list[Any], text_is_nan: bool) -> list[Array]:
     """Convert cell by cell, to find the one that is not a number."""
-    values = np.full(len(cells), np.nan)
-    for row, cell in enumerate(cells.to_pylist()):
-        text = cell.decode(errors="replace")
-        if _is_number(text):
-            values[row] = float(text)
-        elif text.strip() and not text_is_nan:
-            name = table.names[place] or f"column {place + 1}"
-            raise InputError(f"{path}, line {table.first_line + row}: {name} is {text!r}; expected a number")
-    return values
+    found = []
+    for place, column in zip(places, cells, strict=True):
+        values = np.full(len(column), np.nan)
+        for row, cell in enumerate(column.to_pylist()):
+            text = cell.decode(errors="replace")
+            if is_number(text):
+                values[row] = float(text)
+            elif text.strip() and not text_is_nan:
+                name = table.names[place] or f"column {place + 1}"
+                raise InputError(f"{source.place(row)}: {name} is {text!r}; expected a number")
+        found.append(values)
+    return found
 
 
 def parquet_places(path: str | Path, wanted: Sequence[Column], content: bytes | None = None) -> list[str]:

@@ -14,8 +14,9 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, opened, read_bytes, read_head, write_bytes
 from polyins.formats.arrow_arrays import to_numpy
-from polyins.formats.columns import HEAD_BYTES, PIECE_ROWS, Column
+from polyins.formats.columns import PIECE_ROWS, Column
 from polyins.formats.columns import read_in_order as read_text_in_order
+from polyins.formats.layout import HEAD_BYTES
 from polyins.formats.rows import ImuRows, RowSource, Track, intervals
 from polyins.model.geodesy import displacement
 from polyins.model.recording import Array, GnssStream, ImuStream

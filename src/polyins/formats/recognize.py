@@ -15,6 +15,7 @@ from polyins.errors import InputError
 from polyins.files import find, read_head
 from polyins.formats import bundle, euroc, kf_gins, kitti, microstrain, mimu4444, phone, sbg, vectornav, xsens_mt
 from polyins.formats.columns import PARQUET_MAGIC
+from polyins.formats.layout import is_number, sample
 from polyins.formats.log import Log
 from polyins.formats.rtklib import has_rows
 from polyins.model.recording import Array
@@ -23,6 +24,10 @@ HEAD_BYTES = 16384
 MOST_ROWS = 100
 """without a header that are looked at"""
 LONGEST_UBX = 4096
+MANY_ROWS = 10
+"""make a table of a text that begins with something else"""
+FASTEST_DEG_S = 0.05
+"""of a latitude"""
 FEW_ROWS = 4
 """tell nothing of stamps"""
 MOSTLY = 0.8
@@ -123,13 +128,15 @@ def data_format(path: str | Path) -> str:
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
         return "xsens-dot"
-    if (lines[0].startswith("%") and any(re.search("latitude|-ecef|baseline", line) for line in lines)) or has_rows(
-        rows
-    ):
+    if (
+        lines[0].startswith("%") and any(re.search(r"latitude\(|-ecef\(|-baseline\(", line) for line in lines)
+    ) or has_rows(rows):
         return "rtklib-pos"
+    if _are_many_rows(content):
+        return _rows_of_numbers(content) or "table"
     if any(": " in line or line.endswith(":") for line in rows[:20]):
         return "configuration"
-    return _rows_of_numbers(rows) or _table(path, rows)
+    return _rows_of_numbers(content) or _table(path, rows)
 
 
 def readable() -> str:
@@ -190,33 +197,56 @@ def _binary(path: str | Path, head: bytes) -> str:
     """Tell rows of doubles from anything else, which is refused."""
     if kf_gins.are_rows(head):
         return "kf-gins"
+    if head.startswith(b"\xb5\x62"):
+        raise InputError(f"{find(path)}: looks like u-blox UBX without a whole message; is it damaged?")
     raise InputError(f"{find(path)}: is of no known binary format; expected {readable()}")
 
 
-def _rows_of_numbers(rows: list[str]) -> str | None:
+def _are_many_rows(head: bytes) -> bool:
+    """Whether a text is a table, whatever stands before its rows: many have the same number of columns."""
+    found = sample(head)
+    return found is not None and found[0].width >= 3 and len(found[1]) >= MANY_ROWS
+
+
+def _rows_of_numbers(head: bytes) -> str | None:
     """Tell the files without header apart by the number of columns, where the stamps are and by the size of values."""
-    values = _leading_numbers(rows[:MOST_ROWS])
-    count = len(values[0]) if values else 0
-    columns = np.array([row for row in values if len(row) == count]).T
+    found = sample(head)
+    if found is None or any(found[0].names):
+        return None
+    columns = np.array([_numbers(cells) for cells in found[1][:MOST_ROWS]]).T
+    count = len(columns)
     if count == 7 and _rises(columns[0]):
         # A latitude and longitude in degrees, or increments of an IMU: only the former exceed a radian or so.
-        return "kf-gins-gnss" if max(abs(value) for value in values[0][1:3]) > 2.0 else "kf-gins"
+        if max(abs(value) for value in columns[1:3, 0]) > 2.0:
+            return "kf-gins-gnss" if _are_places(columns[0], columns[1], columns[4:7]) else None
+        return None if _are_rates(columns[0], columns[4:7]) or _are_rates(columns[0], columns[1:4]) else "kf-gins"
     if count == 13 and _rises(columns[0]):
         return "kf-gins-gnss"
     if count == 11 and _rises(columns[1]) and columns[0][0] == round(columns[0][0]):
-        return "kf-gins-nav"
+        on_earth = np.abs(columns[2]).max() <= 90.0 and np.abs(columns[3]).max() <= 360.0
+        return "kf-gins-nav" if on_earth else None
     return None
 
 
-def _leading_numbers(rows: list[str]) -> list[list[float]]:
-    """Return the rows before the first that holds a text."""
-    values = []
-    for line in rows:
-        try:
-            values.append([float(text) for text in line.replace(",", " ").split()])
-        except ValueError:
-            break
-    return values
+def _numbers(cells: list[str]) -> list[float]:
+    return [float(text) if is_number(text) else np.nan for text in cells]
+
+
+def _are_places(time: Array, latitude: Array, std: Array) -> bool:
+    """Whether columns can be a latitude, deg, and standard deviations: nothing moves that fast, no std is negative."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed = np.abs(np.diff(latitude)) / np.abs(np.diff(time))
+    fast = len(speed) > 0 and float(np.nanmedian(speed)) > FASTEST_DEG_S
+    return not fast and float(np.mean(std >= 0.0)) > 0.5
+
+
+def _are_rates(time: Array, force: Array) -> bool:
+    """Whether three columns are a specific force in m/s^2 or g rather than its increments."""
+    size = float(np.nanmedian(np.linalg.norm(force, axis=0)))
+    steps = np.abs(np.diff(time))
+    step = float(np.nanmedian(steps)) if len(steps) else 0.0
+    increments = step > 0.0 and 5.0 < size / step < 15.0
+    return not increments and (8.5 < size < 11.2 or 0.85 < size < 1.15)
 
 
 def _rises(stamps: Array) -> bool:

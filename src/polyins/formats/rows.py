@@ -18,12 +18,31 @@ class RowSource:
     path: str
     first_line: int | None = None
     """line of the first row, counted from 1; None: the file has no lines"""
+    lines: NDArray[np.intp] | None = field(default=None, compare=False, repr=False)
+    """line of each row, where they do not follow each other"""
+    warnings: tuple[str, ...] = ()
+    """what of the file is no row"""
 
     def place(self, row: int) -> str:
         """Name a row (counted from 0) as a user finds it: by line in a text file, else by row."""
         if self.first_line is None:
             return f"{self.path}, row {row + 1}"
-        return f"{self.path}, line {self.first_line + row}"
+        return f"{self.path}, line {self.line(row)}"
+
+    def line(self, row: int) -> int:
+        """Return the line of a row (counted from 0) of a file that has lines."""
+        return (self.first_line or 1) + row if self.lines is None else int(self.lines[row])
+
+    def warned(self, text: str) -> RowSource:
+        """Return the source with one more warning."""
+        return replace(self, warnings=(*self.warnings, f"{self.path}: {text}"))
+
+    def at(self, rows: NDArray[np.intp]) -> RowSource:
+        """Return the source of just those rows."""
+        if self.first_line is None:
+            return self
+        lines = rows + self.first_line if self.lines is None else self.lines[rows]
+        return replace(self, lines=lines)
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def read_gnss(path: str | Path) -> Track:
     if not numbered:
         raise InputError(f"{found}: has a header and no rows; expected positions")
     dated = "/" in numbered[0][1]
-    rows = _rows(found, numbered)
+    rows, kept, broken = _rows(found, numbered)
     clock = _clock(header)
     time = _seconds_from_date(rows[:, :6], clock) if dated else _seconds_from_week(rows[:, :2])
     values = rows[:, 6 if dated else 2 :]
@@ -63,7 +63,7 @@ def read_gnss(path: str | Path) -> Track:
     quality = Counter(int(q) for q in values[:, names.index("q")])
     counts = {QUALITIES.get(q, f"Q{q}"): count for q, count in sorted(quality.items())}
     return Track(
-        RowSource(str(found), numbered[0][0]),
+        RowSource(str(found), numbered[0][0], lines=np.array([numbered[row][0] for row in kept])),
         time,
         position * [DEG, DEG, 1.0],
         above_sea="/geodetic" in header,
@@ -71,7 +71,7 @@ def read_gnss(path: str | Path) -> Track:
         velocity=None if velocity is None else velocity * [1.0, 1.0, -1.0],
         velocity_std=three("sdvn", "sdve", "sdvu"),
         quality=counts,
-        warnings=_warnings(found, header, counts),
+        warnings=(*broken, *_warnings(found, header, counts)),
     )
 
 
@@ -147,20 +147,34 @@ def _ecef_to_neu(latitude: Array, longitude: Array) -> Array:
     return np.array(rows).transpose(2, 0, 1)
 
 
-def _rows(path: Path, numbered: list[tuple[int, str]]) -> Array:
-    rows = []
-    for number, line in numbered:
-        try:
-            rows.append([float(text) for text in re.sub(r"[/:,]", " ", line).split()])
-        except ValueError as error:
-            raise InputError(f"{path}, line {number}: {error}; expected a row of numbers") from error
-        if not np.isfinite(rows[-1]).all():
-            raise InputError(f"{path}, line {number}: a value is not finite; expected a row of numbers")
-        if len(rows[-1]) != len(rows[0]):
-            raise InputError(f"{path}, line {number}: {len(rows[-1])} values; expected {len(rows[0])} as before")
-    if len(rows[0]) < 10:
-        raise InputError(f"{path}, line {numbered[0][0]}: {len(rows[0])} values; expected time, position, Q, ns, std")
-    return np.array(rows)
+def _rows(path: Path, numbered: list[tuple[int, str]]) -> tuple[Array, list[int], tuple[str, ...]]:
+    """Return the rows, which of the lines they are, and warnings of broken ones; most have to be whole."""
+    parsed = [_row(line) for _, line in numbered]
+    widths = Counter(len(row) for row in parsed if isinstance(row, list))
+    width = widths.most_common(1)[0][0] if widths else 0
+    wrong = {
+        n: row if isinstance(row, str) else f"{len(row)} values; expected {width} as before"
+        for n, row in enumerate(parsed)
+        if isinstance(row, str) or len(row) != width
+    }
+    texts = [f"{path}, line {numbered[n][0]}: {text}" for n, text in wrong.items()]
+    if 2 * len(wrong) >= len(parsed):
+        raise InputError(texts[0])
+    if width < 10:
+        raise InputError(f"{path}, line {numbered[0][0]}: {width} values; expected time, position, Q, ns, std")
+    kept = [n for n in range(len(parsed)) if n not in wrong]
+    more = f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""
+    said = (f"{texts[0]}{more}; left out",) if texts else ()
+    return np.array([parsed[n] for n in kept], dtype=float), kept, said
+
+
+def _row(line: str) -> list[float] | str:
+    """Return the values of a line, or what is wrong with it."""
+    try:
+        values = [float(text) for text in re.sub(r"[/:,]", " ", line).split()]
+    except ValueError as error:
+        return f"{error}; expected a row of numbers"
+    return values if np.isfinite(values).all() else "a value is not finite; expected a row of numbers"
 
 
 def _names(lines: list[str], count: int) -> list[str]:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.files import read_bytes
-from polyins.formats.columns import layout, read_columns
+from polyins.formats.columns import read_columns
+from polyins.formats.layout import layout
 from polyins.formats.rows import LONGEST_BRIDGE, ImuRows, RowSource, intervals, without
 from polyins.model.recording import Array
 from polyins.model.rig import DEG

@@ -15,7 +15,8 @@ from polyins.formats import columns, kf_gins, table
 from polyins.formats.columns import Column
 from polyins.formats.recognize import imu_format
 from polyins.formats.rows import ImuRows, RowSource
-from polyins.model.findings import Finding
+from polyins.formats.stamps import seconds_per_count
+from polyins.model.findings import LEFT_OUT, Finding
 from polyins.model.recording import Array, ImuStream, usual_interval
 from polyins.prepare.timesync import gaps_of
 from polyins.reading.imu_stream import in_array_axes, measured
@@ -92,7 +93,8 @@ class ImuFile:
             row = (0 if source.first_line else done) - known
             good, found = measured(rows, self.entry, alone=self.alone, first_row=row)
             fresh = _after(good, last)
-            yield fresh, found if len(fresh.time) < len(rows.time) - known else ()
+            lines = tuple(Finding(LEFT_OUT, text, stream=self.entry.name) for text in source.warnings)
+            yield fresh, (*lines, *(found if len(fresh.time) < len(rows.time) - known else ()))
             done, last = done + len(rows.time) - known, fresh.time[-1] if len(fresh.time) else last
             before = [column[-CONTEXT:] for column in whole]
 
@@ -112,7 +114,7 @@ class ImuFile:
     def _ends_after_leap(self, values: list[Array]) -> bool:
         if self.entry.rate_hz or self.columns.time is None:
             return False
-        steps = np.diff(values[-1][-AFTER - 1 :]) * table.SECONDS[self.columns.time.unit]
+        steps = np.diff(values[-1][-AFTER - 1 :]) * seconds_per_count(self.columns.time)
         return bool((steps > LEAP).any())
 
 
@@ -123,10 +125,17 @@ def _after(rows: ImuRows, time: float) -> ImuRows:
 
 def can_be_read_in_order(entry: ImuEntry) -> bool:
     """Whether a file has a format whose rows do not depend on one another, and is packed only where it is text."""
-    if _kind(entry) in ("xsens-dot", "log"):
+    if _kind(entry) in ("xsens-dot", "log") or (entry.columns is not None and not _row_by_row(entry.columns)):
         return False
     parquet = columns.is_parquet(entry.file)
     return not (parquet and find(entry.file).suffix == ".gz")
+
+
+def _row_by_row(columns: ImuColumns) -> bool:
+    """Whether a row of the table is one of the IMU's, and its stamp one number that depends on no other row."""
+    time = columns.time
+    plain = time is None or not (time.dates or time.fine or time.wraps_at)
+    return plain and columns.only is None and not columns.accel.apart
 
 
 def _kind(entry: ImuEntry) -> str:

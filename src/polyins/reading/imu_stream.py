@@ -26,10 +26,10 @@ from polyins.model.rig import DEG, Imu, ImuErrors, NoiseGrade
 from polyins.prepare.plausible import limits_of
 from polyins.reading.log_streams import imu_of
 
-FULL = 0.999
-"""A rate above this part of the full scale has reached it."""
-MOST_SATURATED = 0.1
-"""of the rows"""
+FULL = 0.9985
+"""A rate above this part of the full scale has reached it: 32767 counts of 16.4 in a deg/s end at 1998 deg/s."""
+MOST_SATURATED = 0.5
+"""of the rows: with more of them it is the range or the unit that is wrong"""
 MOST_LOST = 0.1
 """of the rows of the only IMU that are no numbers or out of order"""
 

@@ -263,11 +263,21 @@ def _with_absolute_paths(config: Config, folder: Path, path: Path) -> Config:
     def absolute(entry: Any) -> Any:
         if not entry or not entry.file:
             return entry
-        return entry.model_copy(update={"file": str(folder / Path(entry.file).expanduser())})
+        return entry.model_copy(update={"file": within(entry.file)})
+
+    def within(name: str) -> str:
+        return str(folder / Path(name).expanduser())
+
+    def whole(imu: Any) -> Any:
+        """Return an IMU's entry whose accelerometer may have a file of its own."""
+        if imu.columns is None or not imu.columns.accel.file:
+            return absolute(imu)
+        accel = imu.columns.accel.model_copy(update={"file": within(imu.columns.accel.file)})
+        return absolute(imu).model_copy(update={"columns": imu.columns.model_copy(update={"accel": accel})})
 
     changes = {
         "name": config.name or path.stem,
-        "imus": tuple(absolute(imu) for imu in config.imus),
+        "imus": tuple(whole(imu) for imu in config.imus),
         "gnss": absolute(config.gnss),
         "reference": absolute(config.reference),
         **{kind: absolute(entry) for kind, entry in entries(config)},

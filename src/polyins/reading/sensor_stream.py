@@ -12,9 +12,10 @@ from polyins.config.units import in_si, key_of, read
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
 from polyins.files import find_named
-from polyins.formats.columns import column_names, read_columns
+from polyins.formats.columns import column_names, open_table
 from polyins.formats.rows import SensorRows
-from polyins.formats.table import SECONDS, SENSOR_NAMES
+from polyins.formats.stamps import stamps
+from polyins.formats.table import SENSOR_NAMES
 from polyins.model.recording import AidingStream, Array, NonholonomicOptions
 from polyins.model.rig import DEG, AidingSensor
 from polyins.reading.log_streams import is_log, sensor_of
@@ -95,9 +96,10 @@ def _rows(kind: str, entry: SensorEntry, document: Document) -> SensorRows:
     if entry.columns is None and is_log(entry.file, entry.stream):
         return sensor_of(entry.file, entry.stream, kind)
     columns, unit = _columns(kind, entry, document)
-    wanted = [columns.time.name, columns.value, *([] if columns.std is None else [columns.std])]
-    source, (stamps, value, *std) = read_columns(entry.file, wanted)
-    return SensorRows(source, kind, stamps * SECONDS[columns.time.unit], value * unit, std[0] * unit if std else None)
+    table = open_table(entry.file)
+    value, *std = table.numbers([columns.value, *([] if columns.std is None else [columns.std])])
+    time = stamps(table, columns.time)
+    return SensorRows(table.source, kind, time, value * unit, std[0] * unit if std else None)
 
 
 def _columns(kind: str, entry: SensorEntry, document: Document) -> tuple[SensorColumns, float]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from polyins.checks.faults import clipped
 from polyins.checks.stream_checks import FARTHEST_OFF_AXIS_M, GAP_INTERVALS, WHEEL_RATE_RAD_S, check_imu, check_track
 from polyins.errors import InputError
 from polyins.files import find
@@ -16,7 +17,8 @@ from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
-from polyins.reading.guess import Stream, read_stream
+from polyins.reading.guess import Stream, read_rows, read_table
+from polyins.reading.table_streams import HalfImu, stream_name
 
 Facts = dict[str, Any]
 LARGE = 1e8
@@ -34,8 +36,10 @@ def inspect(path: str | Path) -> Facts:
         return _describe_configuration(path)
     if log_format(path) is not None:
         return _describe_log(path, kind)
-    stream, guesses = read_stream(path)
-    return {**describe(stream), "format": kind, **_problems(stream, guesses)}
+    if kind == "table":
+        return _describe_table(path)
+    stream = read_rows(path, kind)
+    return {**describe(stream), "format": kind, **_problems(stream, ())}
 
 
 def inspect_each(paths: Sequence[str | Path]) -> list[Facts]:
@@ -53,6 +57,29 @@ def describe(stream: Stream) -> Facts:
     """Describe one stream: rows, span, rate, gaps, stamps, NaN, and what its values say."""
     facts = {"file": stream.source.path, "kind": "imu" if isinstance(stream, ImuRows) else "positions"}
     return {**facts, **_timing(stream.time), **(_imu(stream) if isinstance(stream, ImuRows) else _positions(stream))}
+
+
+def _describe_table(path: str | Path) -> Facts:
+    found = read_table(path)
+    if isinstance(found, HalfImu):
+        kind = f"{found.what} alone"
+        facts: Facts = {"file": found.source.path, "kind": kind, **_timing(found.time), "format": "table"}
+        other = "accelerometer" if found.what == "gyro" else "gyro"
+        return {**facts, "problems": [], "warnings": [f"{found.source.path}: is one IMU with the file of the {other}"]}
+    if len(found) == 1:
+        one = found[0]
+        return {**describe(one.rows), "format": "table", **_problems(one.rows, one.guesses)}
+    return {
+        "file": str(find(path)),
+        "kind": "table",
+        "format": "table",
+        "streams": [
+            {"stream": stream_name(found, n), **describe(one.rows), **_problems(one.rows, one.guesses)}
+            for n, one in enumerate(found)
+        ],
+        "problems": [],
+        "warnings": [],
+    }
 
 
 def _describe_log(path: str | Path, kind: str) -> Facts:
@@ -112,6 +139,7 @@ def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
     try:
         if isinstance(stream, ImuRows):
             found = check_imu(stream, WHEEL_RATE_RAD_S, FARTHEST_OFF_AXIS_M)
+            found = (*found, *clipped(stream, "", 0.0, gyro=stream.gyro_range_deg_s is None))
         else:
             found = check_track(stream, "positions")
     except InputError as error:

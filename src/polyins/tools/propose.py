@@ -16,6 +16,7 @@ from polyins.config.yaml_document import Document, as_document
 from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats import geoid, rtklib, table
+from polyins.formats.columns import open_table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track, intervals
@@ -24,15 +25,23 @@ from polyins.model.findings import Finding
 from polyins.model.recording import Recording, usual_interval
 from polyins.model.rig import DEG, HOUR
 from polyins.reading import loading
-from polyins.reading.guess import guess_columns, read_stream
+from polyins.reading.guess import read_stream, read_table
 from polyins.reading.loading import Settings
 from polyins.reading.long_recording import LongRecording
+from polyins.reading.table_streams import DATUM, HalfImu, TableStream, described, joined
 from polyins.tools.inspect import describe
 
 CHECK = "# CHECK:"
 TRACK_FORMATS = {"kf-gins-gnss": "kf-gins"}
 GRADE = "consumer-mems"
 SENSOR_AXES: Axes = ("x", "y", "z")
+FULL_SCALES_DEG_S = (125.0, 250.0, 300.0, 400.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0)
+NEAR_FULL_SCALE = 0.0025
+FEWEST_AT_FULL_SCALE = 5
+LEFT_OUT_THERE = "rows there are left out"
+STILL_RAD_S = 0.1
+FAST_RAD_S = 1.0
+"""of the mean rate, above which the force tells what is down at rest only"""
 FEWEST_SHAKEN = 100
 """rows that tell how much they shake"""
 MEDIAN_TO_STD = 1.4826
@@ -44,6 +53,7 @@ HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
 BY_UTC = "by what both files say of UTC; an autopilot knows it to a tenth of a second; time_offset: estimate finds more"
 FORWARD_IS_A_GUESS = "forward is a guess"
+GUESSED = ("scale is a guess", "unit is a guess")
 LEAST_SIGMAS = 4.0
 """of what chance makes, by which a horizontal axis agrees with the acceleration of the speed if it is forward"""
 FEWEST_MEANS = 20
@@ -64,6 +74,7 @@ class LogSource:
     stream: str = ""
     """its name, in a log"""
     log: Log | None = None
+    table: TableStream | None = None
 
     @property
     def utc_of_zero(self) -> float | None:
@@ -166,10 +177,27 @@ def settings_of(paths: Sequence[Path]) -> Settings:
     return loading.located(document), Document(document.path, document.values), tuple(assumptions(text))
 
 
+def check_proposal(text: str, paths: Sequence[str | Path], out: Path | None) -> None:
+    """Raise InputError if the configuration that is proposed would be refused.
+
+    `out`: where it will be written, from whose folder its names count.
+    """
+    document = as_document((out or Path("proposed.yaml")).resolve(), text)
+    try:
+        loading.build(loading.located(document), document)
+    except InputError as error:
+        files = ", ".join(str(path) for path in paths)
+        raise InputError(f"{files}: cannot be navigated with as they are: {error}") from error
+
+
 def doubted(recording: Recording | LongRecording, assumed: Sequence[str]) -> Recording | LongRecording:
     """Return a recording with a doubt for each assumption that would turn the heading if it were wrong."""
     remedy = "give axes in a configuration (polyins init writes one)"
-    guesses = tuple(Finding("mount", text, "doubt", remedy=remedy) for text in assumed if FORWARD_IS_A_GUESS in text)
+    guesses = tuple(
+        Finding("mount", text, "doubt", remedy=remedy)
+        for text in assumed
+        if FORWARD_IS_A_GUESS in text or any(guess in text for guess in GUESSED)
+    )
     if isinstance(recording, LongRecording):
         head = recording.head
         return replace(recording, head=replace(head, findings=(*head.findings, *guesses)))
@@ -189,6 +217,7 @@ def assumptions(proposal: str) -> list[str]:
 def _sources(paths: Sequence[str | Path]) -> tuple[list[LogSource], list[str]]:
     """Return the streams that can be used, and why others are not; raises InputError if no file is readable."""
     found: list[LogSource] = []
+    halves: list[HalfImu] = []
     left_out: list[str] = []
     refused: list[InputError] = []
     for path in paths:
@@ -202,10 +231,17 @@ def _sources(paths: Sequence[str | Path]) -> tuple[list[LogSource], list[str]]:
                 ]
                 left_out += [f"{path}: {name} is not used: {why}" for name, why in log.unusable.items()]
                 left_out += [f"{path}: {note}" for note in log.notes]
+            elif data_format(path) == "table":
+                streams = read_table(path)
+                if isinstance(streams, HalfImu):
+                    halves.append(streams)
+                else:
+                    found += [LogSource(path, one.rows, one.guesses, table=one) for one in streams]
             else:
                 found.append(LogSource(path, *read_stream(path)))
         except InputError as error:
             refused.append(error)
+    found += _paired(halves, left_out)
     if refused and not found:
         raise refused[0]
     return found, [*left_out, *(f"not used: {error}" for error in refused)]
@@ -221,6 +257,18 @@ def _is_estimate(of: LogSource) -> bool:
 def _is_receiver(of: LogSource) -> bool:
     """Whether positions are those of a log's receiver, which judge nothing."""
     return of.log is not None and not _is_estimate(of) and isinstance(of.rows, Track) and of.rows.attitude is None
+
+
+def _paired(halves: Sequence[HalfImu], left_out: list[str]) -> list[LogSource]:
+    """Return the IMUs of files of a gyro and files of an accelerometer, in their order."""
+    gyros, accels = ([half for half in halves if half.what == what] for what in ("gyro", "accel"))
+    found = []
+    for gyro, accel in zip(gyros, accels, strict=False):
+        one = described(open_table(gyro.source.path), joined(gyro, accel), [])
+        found.append(LogSource(gyro.source.path, one.rows, one.guesses, table=one))
+    for half in (*gyros[len(accels) :], *accels[len(gyros) :]):
+        left_out.append(f"{half.source.path}: holds the {half.what} of an IMU alone, and is not used")
+    return found
 
 
 def _comments(texts: Sequence[str]) -> list[str]:
@@ -273,14 +321,38 @@ def _imu_lines(number: int, imu: LogSource, first: LogSource, speeds: list[LogSo
     shift = _shift(imu, first)
     if shift:
         lines.append(f"    clock_offset_s: {shift!r}  {CHECK} {BY_UTC}")
-    elif number > 1 and imu.log is None:
+    elif number > 1 and imu.log is None and imu.path != first.path:
         lines.append(f"    clock_offset_s: 0.0  {CHECK} added to the stamps, to bring them to the clock of imu1, s")
+    full = full_scale(imu.rows)
+    if full is not None:
+        lines.append(f"    gyro_range_deg_s: {full:.6g}  {CHECK} where the values of the gyro end, so {LEFT_OUT_THERE}")
     return [
         *lines,
         *_axes_lines(imu, facts, speeds),
         _point_line("    position_m", imu),
         _noise_line(imu.rows, imu.log.noise.get(imu.stream) if imu.log else None),
     ]
+
+
+def full_scale(rows: ImuRows) -> float | None:
+    """Return the full scale of a gyro, deg/s, whose largest value is one that is usual and often there; else None."""
+    if rows.gyro_range_deg_s is not None or len(rows.time) < FEWEST_SHAKEN:
+        return None
+    rates = np.abs(rows.dtheta / intervals(rows.time)[:, None]) / DEG
+    largest = float(np.nanmax(rates))
+    usual = any(abs(largest / scale - 1.0) < NEAR_FULL_SCALE for scale in FULL_SCALES_DEG_S)
+    return largest if usual and int((rates > largest * (1.0 - 1e-6)).sum()) >= FEWEST_AT_FULL_SCALE else None
+
+
+def resting_force(rows: ImuRows) -> np.ndarray | None:
+    """Return the mean specific force, m/s^2, of the rows that hardly turn, if the others turn fast; else None."""
+    steps = intervals(rows.time)[:, None]
+    rate = np.linalg.norm(rows.dtheta / steps, axis=1)
+    still = rate < STILL_RAD_S
+    if not still.sum() >= FEWEST_SHAKEN or float(np.nanmean(rate)) < FAST_RAD_S:
+        return None
+    force: np.ndarray = np.asarray(np.nanmean((rows.dvel / steps)[still], axis=0))
+    return force
 
 
 def _noise_line(rows: ImuRows, stated: tuple[float, float] | None = None) -> str:
@@ -331,6 +403,8 @@ def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) 
             f"    mount_deg: [0, 0, 0]  {CHECK} roll, pitch, yaw that the axes are off by, deg",
         ]
     force = np.array(facts["accel_mean_m_s2"] or [0.0, 0.0, -9.8], dtype=float)
+    if isinstance(imu.rows, ImuRows) and (still := resting_force(imu.rows)) is not None:
+        force = still
     axes = upright_axes(("x", "y", "z"), force)
     mean = ", ".join(f"{value:.1f}" for value in force)
     forward = FORWARD_IS_A_GUESS
@@ -431,11 +505,11 @@ def _format_lines(of: LogSource, indent: str) -> list[str]:
         return [f"{indent}stream: {_quoted(of.stream)}"]
     kind = data_format(of.path)
     lines = [f"{indent}format: {TRACK_FORMATS.get(kind, kind)}"]
-    if kind != "table" or not of.notes:
+    if of.table is None or of.table.columns is None:
         return lines
-    columns, _ = guess_columns(of.path)
-    lines.append(f"{indent}columns:  {CHECK} names and units")
-    for group, content in columns.model_dump(mode="json", exclude_none=True).items():
+    lines.append(f"{indent}columns:  {CHECK} {'; '.join(['names and units', *of.table.checks])}")
+    written = of.table.columns.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    for group, content in written.items():
         lines.append(f"{indent}  {group}: {_flow(content)}")
     return lines
 
@@ -457,7 +531,12 @@ def _track_lines(section: str, of: LogSource, first: LogSource, span: tuple[floa
         lines.append(_point_line("  antenna_position_m" if section == "gnss" else "  point_m", of))
     if section == "gnss" and track.position_std is None:
         lines.append(f"  position_std_m: [1.5, 1.5, 3.0]  {CHECK} north, east, down; the file has none")
-    if not track.datum_known:
+    unknown = [check for check in of.table.checks if check.startswith(DATUM)] if of.table else []
+    lines += [
+        f"  height: as-given  {CHECK} {text}; sea-level with geoid_height_m, or ellipsoidal, say which"
+        for text in unknown
+    ]
+    if not unknown and not track.datum_known:
         lines.append(f"  height: ellipsoidal  {CHECK} the log does not tell what heights are above; else sea-level")
     if track.above_sea:
         lines.append(_height_line())
