@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 PICTURES := a3-sources a5=a5-length,a5-book,a5-roughness,a5-thickness afig3=afig3-std,afig3-imus,afig3-common afig6-tracks \
 	afig7=afig7-gyro,afig7-accelerometer afig8-errors bfig7-9=bfig7,bfig8,bfig9 bfig10 split-imus
 
-.PHONY: demo test lint types bench live-flood reproduce pictures clean
+.PHONY: demo test test-oldest lint types bench live-flood reproduce pictures clean
 
 $(BIN)/polyins: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -20,6 +20,17 @@ demo: $(BIN)/polyins
 
 test: $(BIN)/pytest
 	$(BIN)/pytest --numprocesses 2 --dist worksteal
+
+# The kernels and the reference filters with the oldest Numba that pyproject.toml allows.
+test-oldest: build/oldest/bin/pytest
+	build/oldest/bin/polyins warmup
+	build/oldest/bin/pytest tests/kernels tests/navigate/test_engine.py tests/navigate/test_reference_filter.py \
+		tests/navigate/test_reference_wheels.py tests/navigate/test_sensors_reference.py
+
+build/oldest/bin/pytest: pyproject.toml
+	$(PYTHON) -m venv build/oldest
+	build/oldest/bin/python -m pip install --quiet --editable '.[test]' "numba==$$(sed -n 's/.*"numba>=\(.*\)".*/\1/p' pyproject.toml)"
+	touch $@
 
 lint: $(BIN)/pytest
 	$(BIN)/ruff check src tests

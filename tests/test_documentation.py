@@ -435,6 +435,13 @@ def test_every_kind_of_finding_is_listed() -> None:
     assert listed == kinds_of_findings() | {"data", "point"}
 
 
+def test_faults_are_named_by_kinds_that_exist() -> None:
+    from polyins.studies.robustness.case import PARTS
+
+    kinds = {kind for _, faults, _ in PARTS for fault in faults for kind in fault.kinds}
+    assert kinds <= kinds_of_findings()
+
+
 def test_every_target_and_method_is_listed() -> None:
     from polyins.model.methods import METHODS
     from polyins.studies.targets import known

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from polyins.errors import InputError
-from polyins.files import find, plain_suffix, read_bytes, read_text, whole, write_bytes
+from polyins.files import find, new_file, plain_suffix, read_bytes, read_text, whole, whole_folder, write_bytes
 
 
 def test_plain_goes_before_packed(tmp_path: Path) -> None:
@@ -52,3 +52,26 @@ def test_written_in_a_new_folder_and_packed_by_name(tmp_path: Path) -> None:
     assert gzip.decompress((tmp_path / "new" / "a.csv.gz").read_bytes()) == b"text"
     assert plain_suffix("a.CSV.gz") == ".csv"
     assert plain_suffix("a.parquet") == ".parquet"
+
+
+def test_a_folder_is_whole_or_absent(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+
+    def fails() -> None:
+        with whole_folder(target) as beside:
+            (beside / "half").write_text("half")
+            raise ValueError("on the way")
+
+    with pytest.raises(ValueError, match="on the way"):
+        fails()
+    assert not list(tmp_path.iterdir())
+    with whole_folder(target) as beside:
+        (beside / "whole").write_text("whole")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert (target / "whole").read_text() == "whole"
+
+
+def test_what_exists_is_no_new_file(tmp_path: Path) -> None:
+    assert new_file(str(tmp_path / "a")) == tmp_path / "a"
+    with pytest.raises(InputError, match="exists; expected the name of a new one"):
+        new_file(tmp_path)

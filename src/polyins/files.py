@@ -17,7 +17,7 @@ from polyins.errors import InputError
 def find(path: str | Path) -> Path:
     """Return the path, or the path with `.gz` added if only that exists.
 
-    Raises InputError if neither is a file.
+    A folder is found too, and refused where it is read as a file. Raises InputError if nothing is there.
     """
     path = Path(path)
     packed = path.with_name(path.name + ".gz")
@@ -25,7 +25,7 @@ def find(path: str | Path) -> Path:
         if candidate.is_file():
             return candidate
     if path.is_dir():
-        raise InputError(f"{path}: is a folder; expected a file")
+        return path
     raise InputError(f"{path}: no such file; expected it there, plain or as {packed.name}")
 
 
@@ -36,12 +36,19 @@ def find_named(name: str) -> Path:
     return find(name)
 
 
+def _file(path: str | Path) -> Path:
+    found = find(path)
+    if found.is_dir():
+        raise InputError(f"{found}: is a folder; expected a file")
+    return found
+
+
 def read_bytes(path: str | Path) -> bytes:
     """Return the content of a file, unpacked if its name ends in `.gz`.
 
     Raises InputError if it is missing, unreadable, empty, or named `.gz` without being gzip.
     """
-    found = find(path)
+    found = _file(path)
     try:
         content = found.read_bytes()
         if found.suffix == ".gz":
@@ -58,7 +65,7 @@ def read_bytes(path: str | Path) -> bytes:
 @contextmanager
 def opened(path: str | Path) -> Iterator[IO[bytes]]:
     """Open a file to be read in order, unpacked if its name ends in `.gz`; raises InputError as `read_bytes` does."""
-    found = find(path)
+    found = _file(path)
     try:
         with gzip.open(found) if found.suffix == ".gz" else found.open("rb") as file:
             yield cast(IO[bytes], file)

@@ -99,6 +99,14 @@ def test_positions_that_are_late_are_doubted(drive: Recording) -> None:
     assert set(findings) & {"delay", "innovations", "rejected", "noise"}
 
 
+def test_a_delay_is_told_once_with_what_the_course_tells(drive: Recording) -> None:
+    gnss = drive.gnss
+    assert gnss is not None
+    document = pi.evaluate(pi.run(replace(drive, gnss=replace(gnss, time=gnss.time + 0.3))), None)["verdict"]
+    (finding,) = [one for one in document["findings"] if one["kind"] == "delay"]
+    assert finding["size"] == pytest.approx(0.3, abs=0.05)
+
+
 def test_a_std_that_is_too_large_is_noted(drive: Recording) -> None:
     gnss = drive.gnss
     assert gnss is not None

@@ -63,7 +63,7 @@ def test_rows_of_doubles_are_known_without_their_first_and_last(tmp_path: Path) 
     assert data_format(path) == "kf-gins"
 
 
-SIGNATURES = {"SQLite": b"SQLite format 3\0", "MATLAB": b"MATLAB 5.0 MAT-file", "zip": b"PK\x03\x04"}
+SIGNATURES = {"SQLite": b"SQLite format 3\0", "HDF5": b"\x89HDF\r\n\x1a\n"}
 
 
 @pytest.mark.parametrize("name", SIGNATURES)
@@ -74,6 +74,13 @@ def test_known_signatures_are_refused_by_name(name: str, tmp_path: Path) -> None
     if known:
         pytest.skip(f"{name} is read")
     with pytest.raises(InputError, match=f"looks like .*{name}.*, which is not read"):
+        data_format(path)
+
+
+def test_an_archive_that_is_none_is_said_to_be_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "log.zip"
+    path.write_bytes(b"PK\x03\x04" + random_bytes())
+    with pytest.raises(InputError, match="is no whole zip archive"):
         data_format(path)
 
 
@@ -96,8 +103,7 @@ def test_rows_without_header(text: str, expected: str | None, tmp_path: Path) ->
 def test_mt_text_is_no_dot(tmp_path: Path) -> None:
     path = tmp_path / "mt.txt"
     path.write_text("// Start Time: Unknown\nAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\n0\t0\t9\t0\t0\t0\n")
-    with pytest.raises(InputError, match="Xsens MT"):
-        data_format(path)
+    assert data_format(path) == "xsens-mt"
 
 
 def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

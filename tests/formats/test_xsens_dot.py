@@ -200,3 +200,9 @@ def test_raw_recording(data_folder: Path) -> None:
         np.testing.assert_allclose(np.diff(read.time), 1 / 120, rtol=1e-3)
         mean = read.dvel.sum(axis=0) / (read.time[-1] - read.time[0])
         assert 8.5 < mean[2] < 11.0
+
+
+def test_ticks_of_mt_manager_are_no_microseconds(tmp_path: Path) -> None:
+    values = [[10 * k, 0, 0, 0, 0.0, 0.0, 9.8, 0.0, 0.0, 0.0] for k in range(9)]
+    with pytest.raises(InputError, match="is it an export of MT Manager"):
+        read_imu(write(tmp_path / "a.csv", values))

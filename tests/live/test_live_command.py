@@ -76,6 +76,7 @@ def test_the_log_holds_what_was_printed(replayed: tuple[list[dict[str, float]], 
     table = parquet.read_table(out / "solution.parquet")
     assert_logged(table, rows)
     solution = read_solution(out)
+    assert solution.heights == "ellipsoidal"
     np.testing.assert_allclose(solution.time, [row["time_s"] for row in rows])
     assert {path.name for path in out.iterdir()} >= {"summary.json", "solution.parquet", "checkpoint.npz"}
 

@@ -12,6 +12,7 @@ from playing import Event, events, feed, navigator_for, play, rows
 
 from polyins.evaluation.errors import compare_to_reference
 from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import GnssStream, ImuStream, Recording
 from polyins.model.status import STATUSES
 from polyins.navigate import batch, restart
@@ -148,21 +149,63 @@ def test_a_bridged_pause_is_covered(drive: Recording, method: str) -> None:
         assert std[near][0, 2] > np.radians(1.0)
 
 
-def test_blocks_apart_that_coasted_without_gnss_do_not_hold_it() -> None:
-    recording = paused(driven_vehicle.drive(), *COASTED)
-    for method, expected in (("triple-ins", ["serious"]), ("body-ins", []), ("triple-ins/centralized", [])):
-        found = [one for one in batch.run(recording, method).findings if one.kind == "pause"]
-        assert [one.severity for one in found] == expected
+def over_std(solution: batch.Solution, recording: Recording) -> np.ndarray:
+    """The larger one of horizontal position and heading over its standard deviation."""
+    assert recording.reference is not None
+    errors = compare_to_reference(solution, recording.reference)
+    assert errors.attitude is not None
+    rows = errors.covered
+    variance = euler_variance(euler_angles(solution.attitude[rows]), solution.phi_covariance[rows])
+    heading = np.abs(errors.attitude[:, 2]) / np.sqrt(variance[:, 2])
+    return np.maximum(heading, errors.horizontal / np.sqrt(solution.position_variance[rows, :2].sum(axis=1)))
 
 
-def test_live_wheels_coast_as_in_a_batch_run() -> None:
+@pytest.mark.parametrize("length", [0.9, 2.3, 12.0])
+@pytest.mark.parametrize("method", ["triple-ins", "body-ins", "triple-ins/centralized"])
+def test_wheels_without_gnss_go_on_as_unsure_as_a_pause_leaves_them(method: str, length: float) -> None:
+    recording = paused(driven_vehicle.drive(), 60.0, 60.0 + length)
+    solution = batch.run(recording, method)
+    (finding,) = [one for one in solution.findings if one.kind == "restart"]
+    assert finding.severity == ("note" if length < restart.STRAIGHT else "serious")
+    after = solution.time > 60.0 + length
+    assert solution.time[after][0] < 60.0 + length + 0.6
+    assert solution.time[-1] > 119.0
+    assert over_std(solution, recording)[after].max() < 4.0
+    heading_std = np.sqrt(solution.phi_covariance[after, 5])
+    assert heading_std.min() > 0.9 * min(restart.TURN_RATE * length, restart.ANY_HEADING)
+    assert np.sqrt(solution.position_variance[after, :2].sum(axis=1)).min() > 0.4 * length
+
+
+def test_live_wheels_go_on_as_in_a_batch_run(tmp_path: Path) -> None:
     recording = paused(driven_vehicle.drive(), *COASTED)
     prepared, whole = batch.prepare(recording, "triple-ins"), batch.run(recording, "triple-ins")
+    played = events(prepared.recording)
     one = navigator_for(prepared)
-    states = play(one, prepared.recording, events(prepared.recording))
-    np.testing.assert_array_equal(list(states), whole.time)
-    np.testing.assert_array_equal(list(states.values()), rows(whole))
-    assert {found.text for found in one.findings} == {found.text for found in whole.findings}
+    states = play(one, prepared.recording, [event for event in played if event.arrives < 90.0])
+    one.save(tmp_path / "checkpoint")
+    resumed = Navigator.resume(tmp_path / "checkpoint")
+    states |= play(resumed, prepared.recording, [event for event in played if event.arrives >= 90.0])
+    time = np.array(list(states))
+    place = np.searchsorted(whole.time, time)
+    np.testing.assert_array_equal(whole.time[place], time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole)[place])
+    assert np.count_nonzero(time > 90.0) > 5000
+    assert {found.text for found in resumed.findings} == {found.text for found in whole.findings}
+
+
+@pytest.mark.parametrize("length", [1.0, 10.0])
+def test_wheels_with_gnss_begin_anew_under_way(length: float) -> None:
+    recording = paused(driven_vehicle.drive(gnss=True), 50.0, 50.0 + length)
+    assert recording.gnss is not None
+    solution = batch.run(recording, "triple-ins")
+    (finding,) = [one for one in solution.findings if one.kind == "restart"]
+    assert finding.severity == "note"
+    after = solution.time > 50.0 + length
+    assert solution.time[after][0] < 50.0 + length + 2.0
+    assert solution.time[-1] > 119.0
+    over = over_std(solution, recording)[after]
+    assert (over < 3.0).mean() > 0.98
+    assert over.max() < 5.0
 
 
 @pytest.fixture
@@ -203,3 +246,52 @@ def test_wheels_without_gnss_that_begin_anew_so_are_not_to_be_used() -> None:
     (finding,) = [found for found in whole.findings if found.kind == "restart"]
     assert finding.severity == "serious"
     assert whole.time[-1] > 110.0
+
+
+@pytest.fixture(scope="module")
+def misled(drive: Recording) -> Recording:
+    """A drive whose heading is given, wrong by 90 degrees."""
+    reference = drive.reference
+    assert reference is not None
+    assert reference.attitude is not None
+    heading = float(reference.attitude[0, 2]) + np.pi / 2.0
+    return replace(drive, start=replace(drive.start, heading=heading, heading_from="value"))
+
+
+def test_where_resets_do_not_help_the_run_begins_anew(misled: Recording) -> None:
+    whole = batch.run(misled, "enav-fusion")
+    (finding,) = [found for found in whole.findings if found.kind == "restart"]
+    assert finding.severity == "doubt"
+    assert "resets of the position do not help" in finding.text
+    assert finding.to_s is not None
+    errors = compare_to_reference(whole, misled.reference)
+    assert errors.attitude is not None
+    later = errors.time > finding.to_s + 30.0
+    assert later.sum() > 1000
+    assert errors.horizontal[later].max() < 0.3
+    assert np.degrees(np.abs(errors.attitude[later, 2])).max() < 1.5
+    assert errors.horizontal[errors.time < finding.to_s - 10.0].max() > 50.0
+
+
+def test_live_it_begins_anew_as_a_run_does(misled: Recording) -> None:
+    one, whole = navigator(misled), batch.run(misled, "enav-fusion")
+    (finding,) = [found for found in whole.findings if found.kind == "restart"]
+    assert finding.to_s is not None
+    end = finding.to_s + 40.0
+    states = play(one, misled, until(misled, end))
+    time = np.array(list(states))
+    place = np.searchsorted(whole.time, time)
+    np.testing.assert_array_equal(whole.time[place], time)
+    np.testing.assert_array_equal(list(states.values()), rows(whole)[place])
+    assert np.count_nonzero(time > finding.to_s) > 1000
+    assert finding in one.findings
+
+
+def test_a_step_that_is_followed_is_no_reason_to_begin_anew(drive: Recording) -> None:
+    gnss = drive.gnss
+    assert gnss is not None
+    position = gnss.position.copy()
+    position[gnss.time > 100.0] += np.array([50.0, 0.0, 0.0]) / metres_per_unit(position[0], True)
+    solution = batch.run(replace(drive, gnss=replace(gnss, position=position)), "enav-fusion")
+    assert solution.innovations.reset.sum() == 1
+    assert not [found for found in solution.findings if found.kind == "restart"]

@@ -45,10 +45,10 @@ def test_one_silent_chip_does_not_silence_its_module(method: str) -> None:
 def test_the_summary_says_when_nobody_was_left_to_carry() -> None:
     recording = drive()
     for imu in ("left1", "right1", recording.rig.imus[0].name):
-        recording = without(recording, imu, 50.0 if imu == "left1" else 50.5, 52.0)
+        recording = without(recording, imu, 49.0 if imu == "left1" else 50.0, 50.5)
     faults = dict(text.split(": ", 1) for text in pi.run(recording, "triple-ins").faults)
-    assert re.search(r"; for 1.5\d s of it every IMU was, and the vehicle coasted", faults["IMU left1"])
-    assert faults["IMU right1"].endswith("from 50.50 s; the vehicle coasted")
+    assert re.search(r"; for 0.5\d s of it every IMU was, and the vehicle coasted", faults["IMU left1"])
+    assert faults["IMU right1"].endswith("from 50.00 s; the vehicle coasted")
 
 
 def test_a_wheel_alone_coasts_and_finds_its_angle_again() -> None:
@@ -63,9 +63,9 @@ def test_a_wheel_alone_coasts_and_finds_its_angle_again() -> None:
         for p in (run, whole)
     ]
     assert (angles[0].inv() * angles[1]).magnitude() < 15.0 * DEG
-    solution = pi.run(recording, "wheel-ins/left")
-    assert re.fullmatch(r"IMU left1: silent for 2.0\d s from 50.00 s; the vehicle coasted", *solution.faults)
+    solution = pi.run(without(drive(), "left1", 50.0, 50.5), "wheel-ins/left")
+    assert re.fullmatch(r"IMU left1: silent for 0.5\d s from 50.00 s; the vehicle coasted", *solution.faults)
     reference = recording.reference
     assert reference is not None
     after = reference.time[reference.time >= solution.time[0]] < 54.0
-    assert off(solution, recording)[after].max() < 3.0
+    assert off(solution, recording)[after].max() < 0.75

@@ -64,6 +64,26 @@ def test_late_fixes_are_named(velocity: bool, by: float) -> None:
     assert f"clock_offset_s: {-finding.size:.3g}" in finding.remedy
 
 
+@pytest.mark.parametrize("seed", [1, 3, 5])
+@pytest.mark.parametrize("by", [0.2, 0.3])
+def test_fixes_a_little_late_are_named_in_every_drive(seed: int, by: float) -> None:
+    scenario = Scenario(duration_s=260.0, static_s=30.0, rate_hz=50.0, imus=Board(count=1))
+    good = simulate(scenario, seed=seed)
+    assert of(good) == ()
+    (finding,) = of(late_fixes(good, by))
+    assert isinstance(finding.size, float)
+    assert finding.size == pytest.approx(by, abs=0.06)
+
+
+def test_an_antenna_ahead_of_the_axle_is_not_a_delay() -> None:
+    """Its course turns earlier than the vehicle does, by its place over the speed."""
+    scenario = Scenario(duration_s=240.0, static_s=20.0, rate_hz=50.0, imus=Board(count=1))
+    gnss = scenario.gnss
+    assert gnss is not None
+    ahead = scenario.model_copy(update={"gnss": gnss.model_copy(update={"antenna_position_m": (1.0, 0.0, -1.0)})})
+    assert of(simulate(ahead, seed=4)) == ()
+
+
 def test_a_delay_that_begins_is_dated() -> None:
     (finding,) = of(late_fixes(drive(True), 1.0, after=90.0))
     assert finding.from_s is not None

@@ -26,6 +26,39 @@ def repeated(gnss: GnssStream, first: int, count: int) -> GnssStream:
     return replace(gnss, position=position)
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("feet", 3.2808), ("cm", 100.0), ("mm", 1000.0)])
+@pytest.mark.parametrize("last", [49, 99])
+def test_heights_in_another_unit_are_named_with_its_factor(unit: str, factor: float, last: int) -> None:
+    gnss = drive()
+    position = gnss.position + np.random.default_rng(1).normal(0.0, 0.02, gnss.position.shape)
+    position[40 : last + 1, 2] *= factor
+    (finding,) = of_fixes(replace(gnss, position=position), False, END)
+    assert finding.kind == "units"
+    assert unit in finding.text
+    assert finding.size == pytest.approx(factor, rel=0.01)
+    assert (finding.from_s, finding.to_s) == (40.5, last + 0.5)
+
+
+def test_noise_and_a_step_of_heights_are_no_units() -> None:
+    gnss = drive(std=10.0)
+    position = gnss.position + np.random.default_rng(1).normal(0.0, 10.0, gnss.position.shape)
+    assert of_fixes(replace(gnss, position=position), False, END) == ()
+    position = drive().position.copy()
+    position[40:, 2] += 50.0
+    assert of_fixes(replace(drive(), position=position), False, END) == ()
+
+
+def test_fixes_at_latitude_and_longitude_zero_are_named() -> None:
+    gnss = drive()
+    position = np.column_stack([0.8 + gnss.position[:, 0] * 1e-7, np.full(len(gnss.time), 0.1), gnss.position[:, 2]])
+    assert of_fixes(replace(gnss, position=position), True, END) == ()
+    position[40:43, :2] = np.radians(1e-7)
+    kinds = {finding.kind: finding for finding in of_fixes(replace(gnss, position=position), True, END)}
+    assert (kinds["place"].from_s, kinds["place"].to_s) == (40.5, 42.5)
+    near = np.column_stack([1e-6 + gnss.position[:, :2] * 1e-7, gnss.position[:, 2]])
+    assert of_fixes(replace(gnss, position=near), True, END) == ()
+
+
 def test_good_fixes_say_nothing() -> None:
     assert of_fixes(drive(), False, END) == ()
 

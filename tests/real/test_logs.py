@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from polyins.formats.recognize import data_format, read_log
 from polyins.formats.rows import ImuRows, Track, intervals
 from polyins.formats.rtklib import read_gnss
 from polyins.formats.solution_files import read_solution
+from polyins.model.axes import axes_matrix
 from polyins.model.geodesy import displacement
 from polyins.model.rig import DEG
 from polyins.reading.guess import read_stream
@@ -207,9 +210,83 @@ def test_random_bytes_are_refused(name: str, logs: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["static-120s", "turns-80s"])
-def test_an_array_of_bytes_is_refused_by_name(name: str, logs: Path) -> None:
-    with pytest.raises(InputError, match="looks like MIMU4444, which is not read"):
-        inspect(logs / "array-binary" / f"{name}.bin")
+def test_an_array_of_bytes(name: str, logs: Path, expected: dict[str, Any], tmp_path: Path) -> None:
+    path = logs / "array-binary" / f"{name}.bin"
+    log, facts = read_log(path), expected[f"array-binary/{name}.bin"]
+    check_imus(log, facts["imu"])
+    saturated = [imu["rows_saturated"] for imu in facts["imu"].values() if imu["rows_saturated"]]
+    said = [int(re.search(r"rates of (\d+)", note)[1]) for note in log.notes if "full scale" in note]
+    assert said == saturated
+    assert log.points["imu8"] == (0.00945, -0.00945, -0.001)
+    config = tmp_path / "proposed.yaml"
+    config.write_text(propose([path]))
+    assert len(load(config).imus) == 8
+
+
+def test_chips_on_both_sides_of_a_board_turn_alike(logs: Path) -> None:
+    log = read_log(logs / "array-binary" / "turns-80s.bin")
+    turns = {name: rows.dtheta @ axes_matrix(log.axes.get(name, ("x", "y", "z"))).T for name, rows in log.imus.items()}
+    for name in turns:
+        for axis in range(3):
+            assert np.corrcoef(turns["imu1"][:, axis], turns[name][:, axis])[0, 1] > 0.99
+
+
+@pytest.mark.parametrize("name", ["lckf", "tckf"])
+def test_streams_of_vectornav(name: str, logs: Path, expected: dict[str, Any], tmp_path: Path) -> None:
+    paths = [logs / "vectornav" / f"{name}-{part}.csv" for part in ("imu", "gnss")]
+    check_imus(read_log(paths[0]), expected[f"vectornav/{name}-imu.csv"]["imu"])
+    track, facts = read_log(paths[1]).tracks["GNSS1"], expected[f"vectornav/{name}-gnss.csv"]["gnss"]["GNSS1"]
+    assert len(track.time) == facts["rows_3d_fix"]
+    for row, sample in facts["sample"].items():
+        at = int(row)
+        assert track.time[at] == pytest.approx(sample[-1], abs=1e-6)
+        np.testing.assert_allclose(track.position[at] / [DEG, DEG, 1.0], sample[1:4], rtol=0.0, atol=1e-9)
+        assert track.velocity is not None
+        assert track.position_std is not None
+        np.testing.assert_allclose(track.velocity[at], sample[4:7], atol=1e-9)
+        np.testing.assert_allclose(track.position_std[at], sample[7:10], atol=1e-9)
+    config = tmp_path / "proposed.yaml"
+    config.write_text(propose(paths))
+    assert load(config).gnss is not None
+
+
+def common_imu(logs: Path) -> np.ndarray:
+    """t, gyro, force of the drive that the cases repeat."""
+    with gzip.open(logs / "cases" / "common" / "imu.csv.gz", "rt") as file:
+        return np.loadtxt(file, delimiter=",", skiprows=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "turned", "offset"),
+    [
+        ("xsens-mt/mt.txt", [1, -1, -1], 99.975),
+        ("euroc", [1, 1, 1], 1403636579.758555392),
+        ("euroc/mav0/imu0/data.csv", [1, 1, 1], 1403636579.758555392),
+    ],
+)
+def test_the_common_drive(name: str, turned: list[int], offset: float, logs: Path) -> None:
+    log, wanted = read_log(logs / "cases" / name), common_imu(logs)
+    (rows,) = log.imus.values()
+    values = np.column_stack([rows.dtheta, rows.dvel]) / intervals(rows.time)[:, None]
+    np.testing.assert_allclose(rows.time, wanted[:, 0] + offset, atol=1e-6)
+    np.testing.assert_allclose(values[:, :3], wanted[:, 1:4] * turned, atol=1e-6, rtol=1e-4)
+    np.testing.assert_allclose(values[:, 3:], wanted[:, 4:7] * turned, atol=6e-5, rtol=1e-4)
+
+
+def test_a_folder_of_a_phone(logs: Path) -> None:
+    rows = read_log(logs / "cases" / "split-gyro-accel").imus["imu"]
+    values = np.column_stack([rows.dtheta, rows.dvel]) / intervals(rows.time)[:, None]
+    wanted = common_imu(logs)
+    off = values - np.column_stack([np.interp(rows.time, wanted[:, 0], axis) for axis in wanted[:, 1:].T])
+    off -= off.mean(axis=0)  # biases of the common drive
+    assert np.sqrt(np.mean(off[:, :3] ** 2)) < 0.01
+    assert np.sqrt(np.mean(off[:, 3:] ** 2)) < 0.1
+    assert 1.0 / np.median(np.diff(rows.time)) == pytest.approx(40.0, rel=0.01)
+
+
+def test_positions_of_a_tracker(logs: Path) -> None:
+    track = read_log(logs / "cases" / "euroc").tracks["leica0"]
+    assert (len(track.time), track.geodetic) == (80, False)
 
 
 @pytest.mark.parametrize("name", ["headerless-7/imu.csv", "numeric-11/imu.csv"])

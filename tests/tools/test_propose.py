@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import xor
 from pathlib import Path
 
 import numpy as np
@@ -130,3 +132,22 @@ def test_the_axis_that_goes_with_the_speed_is_forward() -> None:
     assert axes == ("-z", "x", "-y")
     assert agreement > 0.9
     assert sigmas > 4.0
+
+
+def test_logs_on_two_clocks_are_brought_together_by_utc(tmp_path: Path) -> None:
+    names = ["GpsTow [s]", "Time::GpsWeek"]
+    names += [f"IMU::{kind}::{axis}" for kind in ("AngularRate", "Accel") for axis in "XYZ"]
+    rows = [f"{100.0 + 0.01 * k:.2f},2300,0,0,0,0,0,-9.8" for k in range(500)]
+    (tmp_path / "imu.csv").write_text("\n".join([",".join(names), *rows]) + "\n")
+    # 18 s of GPS are ahead of UTC, so that the week began at 23:59:42 on the day before
+    bodies = ["GPRMC,000122.00,A,4800.0000,N,01100.0000,E,0.0,,040224,,,A"]
+    bodies += [f"GPGGA,00012{second}.00,4800.0000,N,01100.0000,E,4,12,0.6,500.0,M,46.0,M,," for second in range(2, 6)]
+    lines = [f"${body}*{reduce(xor, body.encode()):02X}" for body in bodies]
+    (tmp_path / "fixes.nmea").write_text("\n".join(lines) + "\n")
+    text = propose([tmp_path / "imu.csv", tmp_path / "fixes.nmea"])
+    sunday = 1707004800.0  # 4 February 2024
+    assert f"clock_offset_s: {-(sunday - 18.0)}  # CHECK: from the clock of one log to that of the other" in text
+    (tmp_path / "config.yaml").write_text(text)
+    gnss = load(tmp_path / "config.yaml").gnss
+    assert gnss is not None
+    np.testing.assert_allclose(gnss.time, [100.0, 101.0, 102.0, 103.0], atol=1e-6)

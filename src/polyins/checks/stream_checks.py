@@ -48,11 +48,13 @@ def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m:
     """
     check_rows(rows)
     _check_rate(rows)
-    _check_accel_unit(rows, off_axis_m)
+    if not rows.units_known:
+        _check_accel_unit(rows, off_axis_m)
     rate = _check_gyro_unit(rows, max_rate_rad_s)
     texts = _uneven(rows.time)
     if rate > UNUSUAL_RATE_RAD_S and max_rate_rad_s <= MAX_RATE_RAD_S:
-        texts.append(f"turns at {rate:.3g} rad/s (rms), which is unusual; is the gyro's unit {rows.gyro_unit}?")
+        doubt = "" if rows.units_known else f"; is the gyro's unit {rows.gyro_unit}?"
+        texts.append(f"turns at {rate:.3g} rad/s (rms), which is unusual{doubt}")
     return (*rows.warnings, *(f"{rows.source.path}: {text}" for text in texts))
 
 
@@ -242,7 +244,7 @@ def _check_gyro_unit(rows: ImuRows, max_rate: float) -> float:
     rms = float(np.sqrt(np.mean((turn / np.diff(rows.time)) ** 2)))
     largest = int(np.argmax(turn))
     on_wheel = max_rate > MAX_RATE_RAD_S
-    if (on_wheel or turn[largest] <= MAX_TURN_RAD) and rms <= max_rate:
+    if rows.units_known or ((on_wheel or turn[largest] <= MAX_TURN_RAD) and rms <= max_rate):
         return rms
     other = {"rad/s": "deg/s", "rad": "rad/s or deg/s", "deg": "deg/s", "deg/s": "another"}[rows.gyro_unit]
     raise InputError(

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+DELAY = "delay"
+"""kind of the finding that a clock is late"""
 DOUBTFUL, USELESS = 3.0, 10.0
 """how many times larger than stated an error may be before it is doubted, and before it is not to be used"""
 LEAST = 20
@@ -55,13 +57,14 @@ class _Statistics:
 
 def verdict(solution: Solution, figures: Figures) -> Verdict:
     """Return what is to be said of a solution; of it only what has no row per epoch is looked at."""
-    known = (*solution.findings, *of_measurements(solution.measurements))
+    known = (*solution.findings, *of_measurements(solution.measurements, solution.findings))
     return Verdict((*known, *_of_epochs(solution.recording_span, figures.epochs), *_of_reference(figures)))
 
 
 def of_live(navigator: Navigator, findings: Sequence[Finding] = ()) -> Verdict:
     """Return what is to be said of what a navigator has done so far; `findings`: of its configuration."""
-    known = (*findings, *navigator.findings, *of_measurements(navigator.measurements))
+    told = (*findings, *navigator.findings)
+    known = (*told, *of_measurements(navigator.measurements, told))
     return Verdict((*known, *_of_epochs(navigator.span, counted(navigator))))
 
 
@@ -71,12 +74,17 @@ def counted(navigator: Navigator) -> Epochs:
     return Epochs(record.first, record.last, record.epochs, record.interval, record.broken)
 
 
-def of_measurements(measurements: Mapping[str, Innovations]) -> tuple[Finding, ...]:
-    """Return what the innovations of a run, by kind, say of it."""
+def of_measurements(measurements: Mapping[str, Innovations], told: Sequence[Finding] = ()) -> tuple[Finding, ...]:
+    """Return what the innovations of a run, by kind, say of it beside what the data have told.
+
+    A filter takes part of a delay for errors of its state: the innovations know it less well than the data.
+    """
+    late = {finding.stream for finding in told if finding.kind == DELAY}
     return tuple(
         finding
         for kind, measured in measurements.items()
         for finding in (*of_wheels(kind, measured), *_of_kind(kind, measured.used()))
+        if finding.kind != DELAY or kind not in late
     )
 
 

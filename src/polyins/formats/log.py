@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, intervals
+from polyins.model.axes import Axes
 from polyins.model.recording import Array
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-Clock = Literal["boot", "unix", "gps-week"]
-"""what stamps count from: the start of the system, 1970 in UTC, the begin of the GPS week"""
+Clock = Literal["boot", "unix", "gps-week", "local-time", "unknown"]
+"""what stamps count from: the start of the system, 1970 in UTC, the begin of the GPS week, 1970 in a time zone that the
+log does not tell, or what the log does not tell"""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,16 @@ class Log:
     utc_of_zero: float | None = None
     """Unix time at which the clock shows zero, s, where the log tells it"""
     upright: bool = False
-    """axes of the IMUs are forward, right, down of the vehicle by the format's definition"""
+    """axes of the IMUs, or what `axes` makes of them, are forward, right, down of the vehicle by the format's
+    definition"""
+    axes: Mapping[str, Axes] = field(default_factory=dict)
+    """by IMU, which of its axes point along those that all of the log's share; without: its own"""
+    points: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    """by stream, where it is, in the axes that the IMUs share, m"""
+    noise: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """by IMU, the random walks that the log states, rad/sqrt(s) and m/s/sqrt(s)"""
+    references: frozenset[str] = frozenset()
+    """tracks that another system estimated: to be compared with, not measurements"""
     fix_age: float | None = None
     """by which fixes are older than their stamps, s; None: the log does not tell"""
     antenna: tuple[float, float, float] | None = None

@@ -13,7 +13,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_head
-from polyins.formats import kf_gins
+from polyins.formats import bundle, euroc, kf_gins, kitti, microstrain, mimu4444, phone, sbg, vectornav, xsens_mt
 from polyins.formats.columns import PARQUET_MAGIC
 from polyins.formats.log import Log
 from polyins.formats.rtklib import has_rows
@@ -57,12 +57,6 @@ def _has_nmea(head: bytes) -> bool:
     return any(re.fullmatch(rb"\$[A-Z]{4,6},[ -~]*\*[0-9A-F]{2}", line.strip()) for line in head.splitlines())
 
 
-def _has_mimu4444(head: bytes) -> bool:
-    """Whether two packets of 106 bytes follow each other near the beginning: aa, a number, hexadecimal 64."""
-    marks = b"\xaa\x64\xaa\x64"
-    return any(bytes(head[k + n] for n in (0, 3, 106, 109)) == marks for k in range(8) if len(head) > k + 109)
-
-
 @dataclass(frozen=True)
 class LogFormat:
     """A format whose files hold several streams."""
@@ -70,7 +64,7 @@ class LogFormat:
     name: str
     title: str
     fits: Callable[[bytes], bool]
-    """whether a file that begins like this has it"""
+    """whether a file that begins like this has it, or a folder or archive with such a list of files"""
     reader: str
     """the module of this package whose `read` returns the `Log` of a path"""
     library: str
@@ -86,12 +80,23 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("mcap", "MCAP of ROS 2", _begins(b"\x89MCAP0\r\n"), "ros_bag", "rosbags", "ros"),
     LogFormat("ubx", "u-blox UBX", _has_ubx, "ublox", "pyubx2", "ubx"),
     LogFormat("nmea", "NMEA 0183", _has_nmea, "nmea_log", "", ""),
+    LogFormat("xsens-mt", "Xsens MT Manager text", xsens_mt.fits, "xsens_mt", "", ""),
+    LogFormat("vectornav", "VectorNav CSV", vectornav.fits, "vectornav", "", ""),
+    LogFormat("microstrain", "MicroStrain MIP Monitor CSV", microstrain.fits, "microstrain", "", ""),
+    LogFormat("sbg", "SBG sbgBasicLogger text", sbg.fits, "sbg", "", ""),
+    LogFormat("navego", "NaveGo .mat (version 5)", _begins(b"MATLAB 5.0"), "navego", "", ""),
+    LogFormat("navego-hdf5", "NaveGo .mat (version 7.3)", _begins(b"MATLAB 7.3"), "navego", "h5py", "matlab"),
+    LogFormat("kitti-oxts", "KITTI raw drive (oxts)", kitti.fits, "kitti", "", ""),
+    LogFormat("phone", "phyphox or Sensor Logger export", phone.fits, "phone", "", ""),
+    LogFormat("euroc", "EuRoC (ASL) folder", euroc.fits, "euroc", "", ""),
+    LogFormat("mimu4444", "MIMU4444", mimu4444.fits, "mimu4444", "", ""),
 )
+FOLDERS = ("EuRoC", "KITTI", "phyphox", "Sensor Logger", "SBG")
+"""what is read of folders and zip archives"""
 
 NOT_READ: dict[str, Callable[[bytes], bool]] = {
     "SQLite": _begins(b"SQLite format 3\0"),
-    "MATLAB or HDF5": _begins(b"MATLAB 5.0", b"\x89HDF\r\n\x1a\n"),
-    "MIMU4444": _has_mimu4444,
+    "HDF5": _begins(b"\x89HDF\r\n\x1a\n"),
     "a zip archive": _begins(b"PK\x03\x04"),
 }
 """what is known and not read, and how it is known"""
@@ -102,20 +107,22 @@ def data_format(path: str | Path) -> str:
 
     Raises InputError if it is none of them.
     """
+    if (log := log_format(path)) is not None:
+        return log.name
+    if find(path).is_dir():
+        raise InputError(f"{path}: is a folder of no known log; expected a file, or {', '.join(FOLDERS)}")
     content = read_head(path, HEAD_BYTES)
     if content[:4] == PARQUET_MAGIC:
         return "table"
-    if (log := log_format(path)) is not None:
-        return log.name
     for title, fits in NOT_READ.items():
         if fits(content):
             raise InputError(f"{find(path)}: looks like {title}, which is not read; expected {readable()}")
     if not kf_gins.is_text(content):
         return _binary(path, content)
-    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    lines = content.decode("utf-8-sig", errors="replace").splitlines() or [""]
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
-        return _xsens(path, lines)
+        return "xsens-dot"
     if (lines[0].startswith("%") and any(re.search("latitude|-ecef|baseline", line) for line in lines)) or has_rows(
         rows
     ):
@@ -133,7 +140,7 @@ def readable() -> str:
 
 def log_format(path: str | Path) -> LogFormat | None:
     """Return the format of a log, or None of any other file."""
-    head = read_head(path, HEAD_BYTES)
+    head = bundle.head(path, HEAD_BYTES)
     return next((log for log in LOGS if log.fits(head)), None)
 
 
@@ -143,10 +150,7 @@ def read_log(path: str | Path) -> Log:
     Raises InputError if it is none, is damaged, or the library that reads it is missing.
     """
     found = find(path)
-    if found.suffix == ".gz":
-        raise InputError(f"{found}: is packed; expected the log unpacked")
-    state = found.stat()
-    return _read_log(found, state.st_mtime_ns, state.st_size)
+    return _read_log(found, *bundle.state(found))
 
 
 @lru_cache(maxsize=8)
@@ -155,6 +159,8 @@ def _read_log(path: Path, _changed: int, _size: int) -> Log:
     known = log_format(path)
     if known is None:
         raise InputError(f"{path}: is no log of several streams; expected {', '.join(log.title for log in LOGS)}")
+    if known.library and path.suffix == ".gz":
+        raise InputError(f"{path}: is packed; expected the log unpacked")
     log: Log = import_module(f"polyins.formats.{known.reader}").read(path)
     return log
 
@@ -185,17 +191,6 @@ def _binary(path: str | Path, head: bytes) -> str:
     if kf_gins.are_rows(head):
         return "kf-gins"
     raise InputError(f"{find(path)}: is of no known binary format; expected {readable()}")
-
-
-def _xsens(path: str | Path, lines: list[str]) -> str:
-    """Tell a DOT's export from that of MT Manager, whose columns have the same names and other units."""
-    header = next(line for line in lines if "Acc_X" in line and "Gyr_X" in line)
-    if lines[0].startswith("//") or "\t" in header:
-        raise InputError(
-            f"{find(path)}: looks like Xsens MT text, in which no units stand; expected a table with its columns "
-            "declared (usually rad/s, m/s^2, and SampleTimeFine in 1e-4 s, for which rate_hz stands in)"
-        )
-    return "xsens-dot"
 
 
 def _rows_of_numbers(rows: list[str]) -> str | None:

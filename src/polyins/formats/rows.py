@@ -41,6 +41,8 @@ class ImuRows:
     """the unit in the file: rad or deg are increments, rad/s or deg/s rates"""
     accel_unit: str = "m/s"
     """m/s is increments, m/s^2 or g rates"""
+    units_known: bool = False
+    """they are constants of the format, so that no size of the values speaks against them"""
     gyro_range_deg_s: float | None = None
     """full scale, where the format is that of one sensor"""
     warnings: tuple[str, ...] = ()
@@ -58,6 +60,8 @@ class Track:
     geodetic: bool = True
     above_sea: bool = False
     """heights are above the sea (geoid), not above the ellipsoid"""
+    datum_known: bool = True
+    """whether the format says which of the two"""
     position_std: Array | None = None
     """m north, east, down, shape (M, 3)"""
     velocity: Array | None = None

@@ -36,6 +36,8 @@ JUMP_DEG_S = 60.0
 ALONE = 10.0
 """so many times farther off than the rates around it are from each other; shocks and vibration ring"""
 COUNTER_RANGE = 2**32
+SHORTEST_S = 1e-3
+"""between rows, several times faster than the sensor"""
 STAMP_SLACK = 0.1
 """of an interval"""
 NAMED_ROWS = 6
@@ -53,6 +55,11 @@ def read_imu(path: str | Path, rate_hz: float | None = None) -> ImuRows:
     source, columns = read_columns(path, wanted, header_has="Gyr_X", text_is_nan=True)
     values = np.column_stack(columns[:6])
     time = np.arange(len(values)) / rate_hz if rate_hz else _seconds(columns[6], stamp or "")
+    if stamp == "SampleTimeFine" and len(time) > 1 and (usual := float(np.nanmedian(np.diff(time)))) < SHORTEST_S:
+        raise InputError(
+            f"{source.path}: SampleTimeFine in us makes steps of {usual:.2g} s; expected those of a DOT (120 Hz at "
+            "most): is it an export of MT Manager, with ticks of 1e-4 s and rad/s?"
+        )
     warnings = []
     if len(values) and not values[0].any():
         warnings.append(f"{source.place(0)}: all values are zero; left out, the sensor begins with such a row")

@@ -131,7 +131,9 @@ class Live:
         self.session.outlets = outlets
         log = _free(options.out / "solution.parquet") if options.resume else options.out / "solution.parquet"
         self.files.append(log)
-        outlets.append(Outlet(ParquetLog(log, {"method": method}), options.rate_hz))
+        as_given = config.gnss is not None and config.gnss.height == "as-given"
+        known: dict[str, object] = {"method": method, "heights": "unknown" if as_given else "ellipsoidal"}
+        outlets.append(Outlet(ParquetLog(log, known), options.rate_hz))
         outlets.extend(open_sink(url, options.rate_hz, geodetic, geoid) for url in options.sinks)
         if options.page is not None:
             self.page = Page(options.bind, options.page, self.report)

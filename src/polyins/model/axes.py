@@ -28,3 +28,10 @@ def axes_matrix(axes: Axes) -> NDArray[np.float64]:
     for row, axis in enumerate(axes):
         matrix[row, "xyz".index(axis[-1])] = -1.0 if axis.startswith("-") else 1.0
     return matrix
+
+
+def composed(outer: Axes, inner: Axes) -> Axes:
+    """Return the sensor axes that point along `outer` of the axes that `inner` makes of the sensor's."""
+    matrix = axes_matrix(outer) @ axes_matrix(inner)
+    first, second, third = (("-" if row.sum() < 0.0 else "") + "xyz"[int(np.argmax(np.abs(row)))] for row in matrix)
+    return first, second, third

@@ -155,6 +155,8 @@ class StartOptions:
     """rad: roll, pitch, heading"""
     estimate_gyro_bias: bool = True
     """use a static interval for the gyro biases of IMUs"""
+    goes_on: bool = False
+    """what is known of the IMUs was found before a pause: a vehicle with wheels need not stand still"""
 
 
 @dataclass(frozen=True)

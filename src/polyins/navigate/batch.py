@@ -21,16 +21,18 @@ from polyins.model.rig import Rig
 from polyins.model.solution import OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.model.status import USUAL, status_of
-from polyins.navigate import bridging, engine, events, layout, outcome, restart
+from polyins.navigate import bridging, engine, events, layout, outcome, receiver, restart
 from polyins.navigate import start as search
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
 from polyins.navigate.events import Events
 from polyins.navigate.layout import Bank
+from polyins.navigate.restart import BROKEN, HOPELESS_STATE
 from polyins.navigate.state import Further, Inputs, Navigators, Outputs, Plan, State, further_work
 from polyins.prepare import alignment, rigid, timesync, wheels
 from polyins.prepare.alignment import Start
 from polyins.prepare.data_findings import of_data
+from polyins.prepare.radii import of_radii
 from polyins.prepare.timesync import Aligned
 
 Array = NDArray[np.float64]
@@ -81,10 +83,23 @@ class Prepared:
         """What it is told."""
         return self.navigators.plan
 
+    @property
+    def hopeless_after(self) -> float:
+        """The end of what is worth something of the state, s, see `receiver`; infinity: all is."""
+        scalars = self.state.scalars
+        if scalars[places.RECEIVER + receiver.IS_HOPELESS] == 0.0:
+            return np.inf
+        return float(scalars[places.RECEIVER + receiver.HOPELESS_AT]) + self.recording.options.gnss_snap
+
     @cached_property
     def further(self) -> Further | None:
         """What some runs need besides."""
         return further_work(self.state, self.plan)
+
+    def stated(self, rows: slice | list[int]) -> Array:
+        """Return the variances of some epochs, with what is unknown of the place and heading that they go on from."""
+        states, variances = self.outputs.states[rows], self.outputs.variances[rows]
+        return restart.with_datum(states, variances, self.start, self.recording.geodetic)
 
     def advance(self, first: int, last: int) -> None:
         """Take epochs first ... last - 1; the first of a run is 1."""
@@ -137,15 +152,15 @@ def run(
 
     parts = restart.parts_of(recording, restart.pauses(of_them))
     whole = Solution.joined(list(restart.run_parts(parts, of_part, restart.rest_of)))
-    return replace(whole, recording_span=_span(of_them))
+    return replace(whole, recording_span=_span(of_them), findings=(*whole.findings, *of_radii(recording)))
 
 
-def known(run: Prepared, last: int, *, broken: bool = False) -> restart.Known:
-    """Return what a run knows which has taken all epochs up to its row `last`; `broken`: see `restart.Known`.
+def known(run: Prepared, last: int, *, ended: str = "") -> restart.Known:
+    """Return what a run knows which has taken all epochs up to its row `last`; `ended`: see `restart.Known`.
 
-    A run whose state is no number knows of its IMUs what it began with.
+    A run whose state is no number, or is given up, knows of its IMUs what it began with.
     """
-    row, variance = run.outputs.states[last], run.outputs.variances[last]
+    row, variance = run.outputs.states[last], run.stated([last])[0]
     begun = zip(run.recording.rig.imus, run.start.imu_errors, run.start.imu_error_std, strict=True)
     return restart.Known(
         time=float(run.inputs.time[last]),
@@ -153,8 +168,9 @@ def known(run: Prepared, last: int, *, broken: bool = False) -> restart.Known:
         velocity=row[3:6].copy(),
         heading=float(euler_angles(row[None, 6:10])[0, 2]),
         position_std=np.sqrt(variance[0:3]),
-        imu_errors={imu.name: (own, std) for imu, own, std in begun} if broken else _imu_errors(run),
-        broken=broken,
+        heading_std=float(np.sqrt(variance[11])),
+        imu_errors={imu.name: (own, std) for imu, own, std in begun} if ended else _imu_errors(run),
+        ended=ended,
     )
 
 
@@ -189,21 +205,23 @@ def navigate(prepared: Prepared, progress: Callable[[float], None] | None = None
 
 
 def navigated(prepared: Prepared, progress: Callable[[float], None] | None = None) -> tuple[Solution, restart.Known]:
-    """Take the epochs of a run up to the first whose state is no number; returns what is known there as well.
+    """Take the epochs of a run up to the first whose state is no number or given up; returns what is known there, too.
 
     Raises InputError if it is the first one.
     """
     solution = navigate(prepared, progress)
-    broken = np.flatnonzero(~solution.is_finite)
-    if not len(broken):
+    broken, hopeless = np.flatnonzero(~solution.is_finite), np.flatnonzero(solution.time > prepared.hopeless_after)
+    ends = [(int(rows[0]), why) for rows, why in ((broken, BROKEN), (hopeless, HOPELESS_STATE)) if len(rows)]
+    if not ends:
         return solution, known(prepared, -1)
-    if not broken[0]:
+    end, why = min(ends)
+    if not end and why == BROKEN:
         raise InputError(
             f"{prepared.method.name}: diverged at {solution.time[0]:.2f} s;"
             " expected wheel radii, mounts, clocks and a start heading that fit the motion"
         )
-    cut = prepared.until(int(broken[0]) + 1)
-    return solution_of(cut, solution.filter_s, solution.first_call_s), known(cut, -1, broken=True)
+    cut = prepared.until(max(end, 1) + 1)
+    return solution_of(cut, solution.filter_s, solution.first_call_s), known(cut, -1, ended=why)
 
 
 def prepare(
@@ -246,7 +264,9 @@ def find_start(recording: Recording, method: str = "enav-fusion", *, imu: int = 
 def start_of(row: Method, recording: Recording, aligned: Aligned, before: restart.Known | None = None) -> Start:
     """Find the start of a method over a recording whose IMUs are on one time base; `before`: see `prepare`."""
     start = search.find(recording, aligned, lambda blind: run(blind, row.name))
-    return restart.as_lost(start, before) if before is not None and restart.is_lost(recording) else start
+    if before is None or not restart.is_lost(recording):
+        return start
+    return restart.as_lost(start, before, recording.geodetic)
 
 
 def lay_out(
@@ -362,7 +382,7 @@ def empty_outputs(inputs: Inputs, plan: Plan, errors: int) -> Outputs:
 def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0) -> Solution:
     """Return what a run has written, as a solution."""
     recording, aligned, outputs = run.recording, run.aligned, run.outputs
-    states, variances = outputs.states[1:], outputs.variances[1:]
+    states, variances = outputs.states[1:], run.stated(slice(1, None))
     track = Trajectory(
         time=aligned.time[1:],
         position=states[:, 0:3],

@@ -287,7 +287,7 @@ class Navigator:
         """Go on after a pause, which began at `last`, s, or anew if it was hopeless."""
         first = self._ahead.first
         held = self._ahead.in_order(self._recording.options.gnss_snap)
-        if first - last > restart.hopeless(self._recording.rig.has_wheels, self._has_fixes):
+        if first - last > restart.hopeless(self._recording.rig.has_wheels):
             self._begin_anew(last, first)
         else:
             self._assembly.newest = first
@@ -310,8 +310,8 @@ class Navigator:
 
     def _search(self, pause: Pause) -> None:
         """Look for a start after a pause, with what the run before it knows."""
-        line, broken = self._timeline, pause.why == restart.BROKEN
-        before = None if line is None else batch.known(line.run, line.last, broken=broken)
+        line, ended = self._timeline, "" if pause.why == restart.NO_DATA else pause.why
+        before = None if line is None else batch.known(line.run, line.last, ended=ended)
         lost = self._recording.rig.has_wheels and not self._has_fixes
         blank = Recording(self._made.rig, (), geodetic=self._recording.geodetic, options=self._recording.options)
         starter = Starter(
@@ -594,20 +594,24 @@ class Navigator:
         if epoch.missing.all():
             queue = events.merged(self._bridged(epoch.time, increments, line), queue)
         line.append(epoch.time, increments, present[self._order], travel[0], queue)
-        if self._is_broken(line):
+        if self._is_over(line):
             return
         assert self._record.part is not None
         self._record.part.take(epoch)
         self._record.take(epoch.time, line.outputs.states[line.last], line.outputs.variances[line.last])
 
-    def _is_broken(self, line: Timeline) -> bool:
-        """Whether the newest state is no number: then the run ends with the last that is one, and begins anew."""
-        states, variances = line.outputs.states, line.outputs.variances
-        if math.isfinite(states[line.last].sum() + variances[line.last].sum()):
+    def _is_over(self, line: Timeline) -> bool:
+        """Whether the newest state is no number or given up: the run ends with the last one before, and begins anew."""
+        states, variances, hopeless_after = line.outputs.states, line.outputs.variances, line.run.hopeless_after
+        broken = not math.isfinite(states[line.last].sum() + variances[line.last].sum())
+        if not broken and line.time <= hopeless_after:
             return False
-        while line.last and not math.isfinite(states[line.last].sum() + variances[line.last].sum()):
+        while line.last and not (
+            math.isfinite(states[line.last].sum() + variances[line.last].sum()) and line.time <= hopeless_after
+        ):
             line.last -= 1
-        self._search(Pause(line.time, line.time + restart.SETTLED, restart.BROKEN))
+        why = restart.BROKEN if broken else restart.HOPELESS_STATE
+        self._search(Pause(line.time, line.time + restart.SETTLED, why))
         return True
 
     def _bridged(self, time: float, increments: Array, line: Timeline) -> Events:
@@ -641,7 +645,7 @@ class Navigator:
                 if refused:
                     self._refuse(refused)
                     return
-            self._is_broken(self._timeline)
+            self._is_over(self._timeline)
 
     def _aid(self, line: Timeline, event: Events) -> str:
         if line.has_event(int(event.kind[0]), float(event.time[0])):
@@ -659,7 +663,7 @@ def _states(line: Timeline, first: int) -> list[NavigatorState]:
     time, rows, variances = (
         line.inputs.time[here],
         line.outputs.states[here].copy(),
-        line.outputs.variances[here].copy(),
+        line.run.stated(here).copy(),
     )
     time, position, velocity, attitude = line.inputs.time[here], rows[:, 0:3], rows[:, 3:6], rows[:, 6:10]
     track = Trajectory(time, position, velocity, attitude, variances[:, 0:3], variances[:, 3:6], variances[:, 6:12])

@@ -6,10 +6,17 @@ difference of two changes is the noise alone, of three fixes, and its variance s
 than the receiver states, the noise that was found is used. A fix that neither the stated noise nor an error of
 the prediction explains begins a series; while the innovation stays what it was the fixes of the series agree with each
 other and not with the past, and weigh next to nothing. If the series lasts, the receiver is right: the position, and
-nothing else, is set to it.
+nothing else, is set to it. Where fixes go on to disagree by many sigma, or reset follows reset, it is not the position
+that is wrong: the state is given up, and the run begins anew, see `restart`.
+
+What the prediction states is measured by the fixes before: where those that were believed disagreed with it by many
+times what was stated, as they do if they are late or the heading is wrong, a fix that disagrees as much is no news, and
+to withhold it would leave a prediction that is known to be wrong to itself.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -23,6 +30,16 @@ LEAST_KNOWN = 5
 """of them: a jump is in two"""
 MEDIAN_OF_SQUARES = 0.4549 * 6.0
 """median of the squared difference of two changes over the variance of a fix, for normal noise"""
+MEDIAN_OF_NIS = 2.366
+"""of three components, for innovations that are what is stated"""
+WRONG = 9.0
+"""times that median, from which it is the prediction that disagrees: innovations are three times as large as stated"""
+LOST = 100.0
+"""times that median, from which a reset has not helped: innovations are ten times as large as stated"""
+HELPED = 33.0
+"""fixes after a reset that did not disagree so: at first its own variances cover much"""
+MOST_RESETS = 3
+"""in a row: what they leave as it is, velocity, attitude and biases, is wrong"""
 TOO_SURE = 16.0
 """times the stated variance, from which the one that was found is used"""
 LEAST_VARIANCE = 0.005**2
@@ -36,10 +53,14 @@ SMALL, SMALL_LASTS, LASTS = 20.0, 10.0, 14.95
 
 CHANGES, COUNT, AFTER, SPREAD, KNOWN, LAST = 0, 33, 34, 37, 40, 41
 SERIES, SINCE, OFFSET, DOUBTS, BEFORE, CHANGED, FIRST, SPEED_VARIANCE = 42, 43, 44, 47, 48, 51, 52, 53
+BELIEVED, DISAGREED = 54, 55
+RESETS, SINCE_RESET, IS_HOPELESS, HOPELESS_AT = 66, 67, 68, 69
 """places in the receiver's part of the scalars: differences of changes, how many were noted; the innovation, and its
 variance by the prediction, after the last update; whether there was one, and when; whether a series lasts, since when,
 and what began it; how many fixes have to be good until one that is wrong is an exception again; the last change, and
-whether there was one; when the first of the latest doubts was; the variance that a reset gives the velocity, or 0"""
+whether there was one; when the first of the latest doubts was; the variance that a reset gives the velocity, or 0; how
+many fixes were believed, and by how many sigma each of the last ones disagreed with the prediction; resets of which
+none has helped yet, and fixes that were believed since the last one; whether the state is given up, and when"""
 
 LOCKED_OUT = 30.0
 """s of doubts without a fix that is believed, after which it is the prediction that is wrong"""
@@ -76,10 +97,10 @@ def use_noise(scalars: Array, measurement: Array, innovation: Array) -> bool:
     count = int(min(scalars[RECEIVER + COUNT], float(RING)))
     if count < LEAST_KNOWN:
         return _limit(measurement)
-    level = 0.5 * (_median(scalars, 0, count) + _median(scalars, 1, count)) / MEDIAN_OF_SQUARES
+    level = 0.5 * (_median(scalars, CHANGES, 3, count) + _median(scalars, CHANGES + 1, 3, count)) / MEDIAN_OF_SQUARES
     for a in range(3):
         variance = measurement[VARIANCE + a]
-        own = level if a < 2 else _median(scalars, 2, count) / MEDIAN_OF_SQUARES
+        own = level if a < 2 else _median(scalars, CHANGES + 2, 3, count) / MEDIAN_OF_SQUARES
         if variance > 0.0 and own > max(TOO_SURE * variance, LEAST_VARIANCE):
             innovation[NOISE] = max(innovation[NOISE], own / variance)
             measurement[VARIANCE + a] = own
@@ -99,17 +120,57 @@ def _limit(measurement: Array) -> bool:
 
 
 @scalar_kernel
-def _median(scalars: Array, a: int, count: int) -> float:
-    """Return the median of the squares of an axis: the value that half of the others are not above."""
+def _median(scalars: Array, first: int, apart: int, count: int) -> float:
+    """Return the median of squares, of which one is every so many places: what half of the others are not above."""
     for i in range(count):
-        value, below, equal = scalars[RECEIVER + CHANGES + 3 * i + a] ** 2, 0, 0
+        value, below, equal = scalars[RECEIVER + first + apart * i] ** 2, 0, 0
         for j in range(count):
-            other = scalars[RECEIVER + CHANGES + 3 * j + a] ** 2
+            other = scalars[RECEIVER + first + apart * j] ** 2
             below += other < value
             equal += other == value
         if below <= count // 2 < below + equal:
             return float(value)
     return 0.0
+
+
+@scalar_kernel
+def note_believed(scalars: Array, nis: float) -> None:
+    """Note by how much a fix that is believed disagrees with the prediction."""
+    row = int(scalars[RECEIVER + BELIEVED]) % RING
+    scalars[RECEIVER + DISAGREED + row] = math.sqrt(nis)
+    scalars[RECEIVER + BELIEVED] += 1.0
+    scalars[RECEIVER + SINCE_RESET] += 1.0
+    if scalars[RECEIVER + RESETS] == 0.0 or scalars[RECEIVER + SINCE_RESET] < RING:
+        return
+    if disagreement(scalars) > LOST:
+        _give_up(scalars)
+    elif scalars[RECEIVER + SINCE_RESET] >= HELPED:
+        scalars[RECEIVER + RESETS] = 0.0
+
+
+@scalar_kernel
+def note_reset(scalars: Array) -> None:
+    """Note that the position was set to a fix."""
+    scalars[RECEIVER + RESETS] += 1.0
+    scalars[RECEIVER + SINCE_RESET] = 0.0
+    if scalars[RECEIVER + RESETS] >= MOST_RESETS:
+        _give_up(scalars)
+
+
+@scalar_kernel
+def _give_up(scalars: Array) -> None:
+    if scalars[RECEIVER + IS_HOPELESS] == 0.0:
+        scalars[RECEIVER + IS_HOPELESS], scalars[RECEIVER + HOPELESS_AT] = 1.0, scalars[TIME]
+
+
+@scalar_kernel
+def disagreement(scalars: Array) -> float:
+    """Return how many times larger than stated the squares of the innovations usually are; 1 if that is not many."""
+    count = int(min(scalars[RECEIVER + BELIEVED], float(RING)))
+    if count < LEAST_KNOWN:
+        return 1.0
+    usual = _median(scalars, DISAGREED, 1, count) / MEDIAN_OF_NIS
+    return usual if usual > WRONG else 1.0
 
 
 @scalar_kernel

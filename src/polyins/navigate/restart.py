@@ -3,7 +3,9 @@
 While no IMU has data the velocity goes off by as much as the vehicle changes it, and nothing tells where it looks. A
 covariance that says so would be too large for a filter that is linear in its errors. So the state is found anew; the
 errors of the IMUs are kept, less sure by what they drift in that time. On wheels without GNSS nothing tells place and
-heading again: the old ones stand, as unsure as what a vehicle can drive and turn.
+heading again. What the vehicle may have driven and turned moves and turns all that follows as a whole, which dead
+reckoning does not see: speed, constraints and gravity are the same in every place and under every heading. So the
+filter goes on as sure as it is of that, and what the pause left unknown, `alignment.Datum`, is added to what it says.
 """
 
 from __future__ import annotations
@@ -18,17 +20,18 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.model.findings import Finding, Severity
+from polyins.model.geodesy import displacement, metres_per_unit
 from polyins.model.recording import Recording, StartOptions
-from polyins.model.rig import Imu, ImuErrors
+from polyins.model.rig import DEG, Imu, ImuErrors
 from polyins.model.solution import Solution
-from polyins.navigate.bridging import TURN_RATE
-from polyins.prepare.alignment import Start
+from polyins.navigate.bridging import ACCELERATION, TURN_RATE
+from polyins.prepare.alignment import Datum, Start
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
-NO_DATA, BROKEN = "no IMU has data", "the state is no number"
+NO_DATA, BROKEN, HOPELESS_STATE = "no IMU has data", "the state is no number", "resets of the position do not help"
 SETTLED = 1.0
-"""s after a state that is no number, which the run before it has seen"""
+"""s after a state that is no number or is given up, which the run before it has seen"""
 
 
 class Pause(NamedTuple):
@@ -41,10 +44,11 @@ class Pause(NamedTuple):
     why: str = NO_DATA
 
 
-HOPELESS, HOPELESS_ON_WHEELS, HOPELESS_BLIND = 1.0, 0.6, 3.0
-"""s without data of any IMU, after which the state is found anew: of an array; of wheels with GNSS, which coast; and
-without. What a vehicle may turn in that time, see `bridging`, is as much as a filter that is linear takes. Without
-fixes there is nothing to take, and nothing that would tell the heading again."""
+HOPELESS, HOPELESS_ON_WHEELS = 1.0, 0.6
+"""s without data of any IMU, after which the state is found anew: of an array; of wheels, which coast. What a vehicle
+may turn in that time, see `bridging`, is as much as a filter that is linear takes."""
+STRAIGHT = 3.0
+"""s for which a vehicle is taken to have gone on as it went; after that it may look anywhere"""
 AGED = 1.5
 """times the std of IMU errors after a pause"""
 USUAL_SPEED = 10.0
@@ -54,8 +58,11 @@ CLIMBED = 0.1
 SMALL_TURN = 5.0
 """deg: more is ten times what a heading by dead reckoning is usually sure to"""
 UNKNOWN = "unknown: that before the pause"
+COASTED = "that before the pause"
 ANY_HEADING = np.pi / np.sqrt(3.0)
 """rad: std of a heading of which nothing is known"""
+SURE_POSITION, SURE_HEADING = 0.01, 0.1 * DEG
+"""m, rad: std with which dead reckoning goes on from where it is taken to be"""
 
 
 @dataclass(frozen=True)
@@ -72,22 +79,22 @@ class Known:
     """rad"""
     position_std: Array
     """m"""
+    heading_std: float
+    """rad"""
     imu_errors: dict[str, tuple[Array, Array]]
     """of each IMU by its name, and their std, (12,) each"""
-    broken: bool = False
-    """whether the state is no number at the epoch after it"""
+    ended: str = ""
+    """why the run ended there though its data went on"""
 
 
-def hopeless(on_wheels: bool, fixes: bool) -> float:
-    """Return how long no IMU may have data before the state is found anew, s; `fixes`: whether there is GNSS."""
-    if not on_wheels:
-        return HOPELESS
-    return HOPELESS_ON_WHEELS if fixes else HOPELESS_BLIND
+def hopeless(on_wheels: bool) -> float:
+    """Return how long no IMU may have data before the state is found anew, s."""
+    return HOPELESS_ON_WHEELS if on_wheels else HOPELESS
 
 
 def pauses(recording: Recording) -> list[Pause]:
     """Return where no IMU has data for hopelessly long: the last stamp before and the first after, s."""
-    limit = hopeless(recording.rig.has_wheels, recording.gnss is not None)
+    limit = hopeless(recording.rig.has_wheels)
     gaps = []
     for stream in recording.imus:
         edges = np.concatenate([[-np.inf], stream.time, [np.inf]])
@@ -111,7 +118,7 @@ def parts_of(recording: Recording, found: Sequence[Pause]) -> Iterator[tuple[Pau
 
 
 def rest_of(part: Recording, pause: Pause) -> Recording:
-    """Return what is left of a part after a state that is no number."""
+    """Return what is left of a part after a state that is no number or was given up."""
     return part_of(part, np.nextafter(pause.end, -np.inf), np.inf, pause)
 
 
@@ -142,14 +149,14 @@ def run_parts(
     while following is not None:
         pause, part = following
         begun = False
-        broken: Known | None = None
+        ended: Known | None = None
         try:
             for solution, knowing in run(part, before, pause):
                 if held is not None:
                     yield held
                 if not begun and pause is not None:
                     told = (*told, restarted(pause, solution.start))
-                begun, broken, first = True, knowing if knowing.broken else None, first or solution.start
+                begun, ended, first = True, knowing if knowing.ended else None, first or solution.start
                 found = (*told, *(one for one in solution.findings if one not in told))
                 held = replace(solution, start=first, findings=found)
         except InputError as error:
@@ -159,8 +166,8 @@ def run_parts(
             told = told if pause is None else (*told, left_out(pause, str(error)))
         else:
             told, before = told if held is None else held.findings, knowing
-        if broken is not None:
-            pause = Pause(broken.time, broken.time + SETTLED, BROKEN)
+        if ended is not None:
+            pause = Pause(ended.time, ended.time + SETTLED, ended.ended)
             following = pause, rest(part, pause)
         else:
             following = next(ahead, None)
@@ -232,13 +239,14 @@ def after(recording: Recording, before: Known | None, lost: bool) -> Recording:
     wanted = recording.start
     if before is None and wanted.time is not None:
         return recording
-    start = StartOptions(end_time=wanted.end_time)
+    start = StartOptions(end_time=wanted.end_time, goes_on=before is not None)
     if wanted.heading_from == "reference":
         start = replace(start, heading_from="reference")
     if before is None:
         return replace(recording, start=start)
     if lost:
-        start = replace(start, position=before.position, heading=before.heading)
+        shown = any(sensor.kind == "heading" for sensor in recording.rig.sensors)
+        start = replace(start, position=before.position, heading=None if shown else before.heading)
     imus = [
         _with_errors(imu, *before.imu_errors[imu.name]) if imu.name in before.imu_errors else imu
         for imu in recording.rig.imus
@@ -246,16 +254,46 @@ def after(recording: Recording, before: Known | None, lost: bool) -> Recording:
     return replace(recording, start=start, rig=replace(recording.rig, imus=tuple(imus)))
 
 
-def as_lost(start: Start, before: Known) -> Start:
-    """Return a start at the old place and heading, as unsure as a vehicle that drove and turned since."""
-    speed = max(USUAL_SPEED, float(np.linalg.norm(before.velocity)))
-    driven = np.array([1.0, 1.0, CLIMBED]) * speed * (start.time - before.time)
+def as_lost(start: Start, before: Known, geodetic: bool) -> Start:
+    """Return a start where the vehicle may be, and the datum as unsure as one that drove and turned since."""
+    length, speed = start.time - before.time, float(np.linalg.norm(before.velocity))
+    told = start.sources["heading"] != "given"
+    turned = 0.0 if told else min(float(np.hypot(before.heading_std, TURN_RATE * length)), ANY_HEADING)
+    if length <= STRAIGHT and not before.ended:
+        moved = before.velocity * length / metres_per_unit(before.position, geodetic)
+        off = 0.5 * length**2 * np.hypot(ACCELERATION, speed * TURN_RATE) + before.heading_std * speed * length
+        heading = COASTED
+    else:
+        moved, off = np.zeros(3), max(USUAL_SPEED, speed) * length
+        heading, turned = UNKNOWN, 0.0 if told else ANY_HEADING
+    driven = np.hypot(before.position_std, np.array([1.0, 1.0, CLIMBED]) * off)
     return replace(
         start,
-        position_std=np.hypot(before.position_std, driven),
-        attitude_std=np.array([*start.attitude_std[:2], ANY_HEADING]),
-        sources={**start.sources, "position": "that before the pause", "heading": UNKNOWN},
+        position=start.position + moved,
+        position_std=np.full(3, SURE_POSITION),
+        attitude_std=start.attitude_std if told else np.array([*start.attitude_std[:2], SURE_HEADING]),
+        sources={**start.sources, "position": "that before the pause", **({} if told else {"heading": heading})},
+        datum=Datum(driven, turned),
     )
+
+
+def with_datum(states: Array, variances: Array, start: Start, geodetic: bool) -> Array:
+    """Return the variances of states, (T, 12), with what is unknown of the datum.
+
+    `states`: position and velocity come first in them. A heading that is off by psi moves what is r away from the start
+    by psi times r, across.
+    """
+    datum = start.datum
+    if datum is None:
+        return variances
+    square = datum.heading_std**2
+    way = displacement(states[:, :3], start.position, geodetic)
+    found = variances.copy()
+    found[:, 0:3] += datum.position_std**2
+    found[:, 0:2] += square * way[:, 1::-1] ** 2
+    found[:, 3:5] += square * states[:, 4:2:-1] ** 2
+    found[:, 11] += square
+    return found
 
 
 def part_of(recording: Recording, begin: float, end: float, pause: Pause | None) -> Recording:

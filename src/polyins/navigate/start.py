@@ -23,6 +23,12 @@ def find(recording: Recording, aligned: Aligned, run: Run) -> Start:
     """
     if not recording.rig.has_wheels or not course.is_wanted(recording):
         return alignment.find_start(recording, aligned)
+    if recording.start.goes_on:
+        # under way the heading is that at the very start
+        ahead = replace(recording, start=replace(recording.start, heading=0.0, heading_from="value"))
+        begins = alignment.find_start(ahead, aligned)
+        if begins.sources["time"] == alignment.ROLLING:
+            recording = replace(recording, start=replace(recording.start, time=begins.time))
     begin = alignment.find_start(course.blind(recording), aligned).time
     found = course.find(recording, begin, run)
     known = replace(recording.start, heading=found.heading, heading_from="value")

@@ -112,7 +112,7 @@ class Starter:
                 self.refusals.add(sample.imu, why, self.newest if rows.numbers else sample.time)
             return None
         if isinstance(sample, ImuSample):
-            longest = restart.hopeless(self.blank.rig.has_wheels, self.needs_fix or bool(self.fixes.stamps))
+            longest = restart.hopeless(self.blank.rig.has_wheels)
             if self.newest_imu > float("-inf") and sample.time - self.newest_imu > longest:
                 found = self._from(self._found(self.newest_imu))
                 if found is not None:
@@ -158,7 +158,7 @@ class Starter:
         if start is None:
             return None
         if self.before is not None:
-            start = restart.as_lost(start, self.before)
+            start = restart.as_lost(start, self.before, self.blank.geodetic)
         if self.after is not None:
             self.findings.append(restart.restarted(self.after, {"time_s": start.time, **start.sources}))
         return start, self._collected()

@@ -284,12 +284,14 @@ def _uses_other_noise(state: State, plan: Plan, work: Work, innovation: Array) -
 @scalar_kernel
 def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) -> int:
     """Return what becomes of a measurement, whose variances are raised if it weighs less."""
-    kind, scalars = int(work.measurement[KIND]), state.scalars
+    kind, scalars, limit = int(work.measurement[KIND]), state.scalars, plan.settings[GATE_LIMIT]
+    if kind == kinds.GNSS_POSITION:
+        limit *= receiver.disagreement(scalars)
     # a receiver that has just been wrong gets no benefit of the doubt
     if kind == kinds.GNSS_POSITION and scalars[RECEIVER + receiver.DOUBTS] > 0.0:
-        passes = innovation[NIS] <= min(plan.settings[GATE_LIMIT], receiver.WARY_LIMIT)
+        passes = innovation[NIS] <= min(1.0, receiver.WARY_LIMIT / plan.settings[GATE_LIMIT]) * limit
     else:
-        passes = innovation[NIS] <= plan.settings[GATE_LIMIT] or _passes_with_caution(plan, work, rows)
+        passes = innovation[NIS] <= limit or _passes_with_caution(work, rows, limit)
     if kind != kinds.GNSS_POSITION:
         if passes or (kind == kinds.WHEEL_SPEED and scalars[TIME] <= scalars[SLIP_TRUSTED]):
             return ACCEPTED
@@ -304,6 +306,7 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) 
     if passes and (noisy or not of_series):
         scalars[RECEIVER + receiver.SERIES] = 0.0
         scalars[RECEIVER + receiver.DOUBTS] = max(0.0, scalars[RECEIVER + receiver.DOUBTS] - 1.0)
+        receiver.note_believed(scalars, innovation[NIS])
         return ACCEPTED
     if scalars[RECEIVER + receiver.SERIES] == 0.0:
         scalars[RECEIVER + receiver.FIRST] = scalars[TIME]
@@ -313,6 +316,7 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) 
         receiver.begin_series(scalars, innovation)
     if (of_series and receiver.has_lasted(scalars)) or receiver.is_locked_out(scalars, innovation):
         scalars[RECEIVER + receiver.SERIES] = scalars[RECEIVER + receiver.DOUBTS] = 0.0
+        receiver.note_reset(scalars)
         return RESET
     receiver.doubt(work.measurement, innovation, of_series)
     return DEWEIGHTED
@@ -331,11 +335,11 @@ def _note(state: State, work: Work, innovation: Array, status: int) -> None:
 
 
 @scalar_kernel
-def _passes_with_caution(plan: Plan, work: Work, rows: int) -> bool:
+def _passes_with_caution(work: Work, rows: int, limit: float) -> bool:
     cautious = 0.0
     for row in range(rows):
         cautious += kalman.cautious_innovation_squared(work.updates[int(work.residuals[row, UPDATE])], CAUTION)
-    passes: bool = cautious <= plan.settings[GATE_LIMIT] * rows
+    passes: bool = cautious <= limit * rows
     return passes
 
 

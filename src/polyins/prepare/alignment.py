@@ -16,13 +16,14 @@ from polyins.model.recording import AidingStream, GnssStream, Recording, StartOp
 from polyins.model.rig import DEG, Rig
 from polyins.prepare.first_motion import Beginning, FirstMotion
 from polyins.prepare.in_motion import Prior
+from polyins.prepare.rolling import HALF, RollingMotion, rolling_motion
 from polyins.prepare.timesync import Aligned
 from polyins.prepare.under_way import AROUND, HARDEST, GroundMotion, find_motion
 
 Array = NDArray[np.float64]
 
 WINDOW = 1.0  # s
-UNDER_WAY = "first fix in motion"
+UNDER_WAY, ROLLING = "first fix in motion", "first data under way"
 """where the time of a start comes from"""
 STILL_RATE = 0.4 * DEG  # rad/s, of the averaged gyro within a window
 STILL_FORCE = 0.10  # m/s^2
@@ -32,8 +33,23 @@ LONGEST_STANDSTILL = 60.0  # s
 FARTHEST_START = 10e3  # m from GNSS: farther away it is another place
 LEAST_LEFT = 1.0  # s, of data after the start
 STANDSTILL_SPEED = 0.05  # m/s: std at a standstill
+ROLLING_SPEED, ROLLING_TILT = 0.1, 1.0 * DEG
+"""m/s, rad: std of what wheels and forces tell of a vehicle that rolls"""
 MISALIGNED = 0.02
 """rad: by that IMUs of an array may look elsewhere than their mounts say"""
+
+
+@dataclass(frozen=True)
+class Datum:
+    """How sure the place and the heading are from which dead reckoning goes on, where nothing tells them again.
+
+    All that follows is off by it as a whole, moved and turned about the start.
+    """
+
+    position_std: Array
+    """m north, east, down, shape (3,)"""
+    heading_std: float
+    """rad"""
 
 
 @dataclass(frozen=True)
@@ -66,6 +82,8 @@ class Start:
     """of a fix as they scatter at a standstill, m, shape (3,); None: there is none"""
     decided: bool = True
     """whether further data would leave it as it is"""
+    datum: Datum | None = None
+    """beside the standard deviations, which are those of what follows; None: nothing"""
 
     @classmethod
     def known(
@@ -600,9 +618,37 @@ class _RollingSearch(_Search):
         # it starts at a standstill in any case
         return False
 
+    def _standstill(self) -> tuple[float, float] | None:
+        found = super()._standstill()
+        if found is None or not self.options.goes_on or found[0] - self.aligned.time[0] <= WINDOW:
+            return found
+        del self.sources["standstill"]
+        return None
+
+    def _time(self, still: tuple[float, float] | None) -> float:
+        if still or self.options.time is not None or not self.options.goes_on:
+            return super()._time(still)
+        wanted, gnss = float(self.aligned.time[0]) + HALF, self.recording.gnss
+        if gnss is not None and self.options.position is None:
+            # between two fixes the position would be off by what the vehicle turns there
+            later = gnss.time[gnss.time >= wanted]
+            if not later.size:
+                raise InputError("start: no fix from GNSS; expected one after the pause")
+            wanted = float(later[0])
+        return self._epoch(wanted, ROLLING)
+
+    def _rolling(self, time: float) -> RollingMotion:
+        return rolling_motion(self.recording.rig, self.aligned, self.errors, time)
+
     def _velocity(self, time: float, still: tuple[float, float] | None) -> tuple[Array, Array]:
         standing = still is not None and still[0] <= time <= still[1] + 0.5
         if self.options.velocity is None and not standing:
+            known = self._known_heading(time, still) if self.options.goes_on else None
+            if known is not None:
+                self.sources["velocity"] = "wheels"
+                speed, (heading, heading_std) = self._rolling(time).speed, known
+                std = np.full(3, np.hypot(ROLLING_SPEED, speed * heading_std))
+                return speed * np.array([np.cos(heading), np.sin(heading), 0.0]), std
             raise InputError(
                 "start: no standstill of three seconds; a vehicle with wheels starts at one:"
                 " expected start.static_interval_s, or start.velocity_m_s and start.roll_pitch_deg"
@@ -627,6 +673,13 @@ class _RollingSearch(_Search):
             # at a standstill of the vehicle, whose wheels may have any angle; else of each IMU itself
             self.sources["roll_pitch"] = "given"
             self.imu_attitudes[[not still or imu.wheel is None for imu in imus], :2] = given
+        elif not still and self.options.goes_on:
+            self.sources["roll_pitch"] = "levelled in motion, acceleration from wheels"
+            motion = self._rolling(time)
+            for i, imu in enumerate(imus):
+                # with the vehicle to the north, a module on a wheel looks to the right
+                heading = 0.0 if imu.wheel is None else np.pi / 2.0
+                self.imu_attitudes[i, :2] = level(motion.forces[i], motion.acceleration, heading)
         elif not still:
             raise InputError(
                 "start: no standstill of three seconds; a vehicle with wheels starts at one:"
@@ -634,7 +687,7 @@ class _RollingSearch(_Search):
             )
         bodies = [i for i, imu in enumerate(imus) if imu.wheel is None]
         roll, pitch = self.imu_attitudes[bodies[0], :2] if bodies else (0.0, 0.0)
-        return (float(roll), float(pitch)), 0.5 * DEG
+        return (float(roll), float(pitch)), 0.5 * DEG if still or given is not None else ROLLING_TILT
 
     def _heading(
         self, time: float, still: tuple[float, float] | None, roll_pitch: tuple[float, float], velocity: Array

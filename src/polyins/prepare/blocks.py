@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +39,12 @@ class Blocks:
         summed = aligned.increments[used].reshape(count, length, 6, -1).sum(axis=1)
         whole = ~np.asarray(aligned.missing[used].reshape(count, length, -1).any(axis=1))
         rates = summed / np.diff(edges)[:, None, None]
-        return cls(edges[1:], rates, whole, np.median(rates, axis=2))
+        # sorting a few is several times quicker than `np.median`
+        ordered, half = np.sort(rates, axis=2), rates.shape[2] // 2
+        middle = 0.5 * (ordered[:, :, half] + ordered[:, :, -1 - half])
+        return cls(edges[1:], rates, whole, middle)
 
-    @property
+    @cached_property
     def interval(self) -> float:
         """The usual length of a block, s."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else BLOCK

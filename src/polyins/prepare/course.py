@@ -18,8 +18,10 @@ Array = NDArray[np.float64]
 Track = Solution
 """as dead reckoning from heading zero gives it"""
 
-LENGTH = 50.0
-"""m of track that are compared; farther on dead reckoning bends"""
+LENGTH, LONGEST = 50.0, 100.0
+"""m from its beginning, and along it, over which a track is compared; farther on dead reckoning bends"""
+STEP = 5.0
+"""m between the fixes by which it is known how long a track is: their noise makes it longer"""
 FARTHER = 1.3
 """That many times the length by GNSS is farther than it by dead reckoning, whose radii may be wrong by a tenth."""
 SHORTEST = 5.0
@@ -95,12 +97,26 @@ def _end(recording: Recording, gnss: GnssStream, begin: float) -> float | None:
     time, position = gnss.time[ahead], gnss.position[ahead]
     if not len(time):
         return recording.start.end_time
-    way = np.linalg.norm(displacement(position, position[0], recording.geodetic)[:, :2], axis=1)
-    far = way > FARTHER * LENGTH + 10.0 * float(gnss.position_std[:, :2].max())
+    place = displacement(position, position[0], recording.geodetic)[:, :2]
+    way, noise = np.linalg.norm(place, axis=1), 10.0 * float(gnss.position_std[:, :2].max())
+    far = way > FARTHER * LENGTH + noise
     lasting = np.flatnonzero(far[:-2] & far[1:-1] & far[2:]) + 2
     known = np.inf if recording.start.end_time is None else recording.start.end_time
-    end = min(known, float(time[lasting[0]]) if len(lasting) else np.inf)
-    return end if np.isfinite(end) else None
+    long = _after(place, FARTHER * LONGEST, STEP + noise)
+    ends = [known, *(float(time[k]) for k in (*lasting[:1], *([] if long is None else [long])))]
+    return min(ends) if np.isfinite(min(ends)) else None
+
+
+def _after(place: Array, length: float, step: float) -> int | None:
+    """Return the first of places, (M, 2), up to which their track is that long, m, in steps of so many; None: none."""
+    last, gone = place[0], 0.0
+    for k, one in enumerate(place):
+        chord = float(np.linalg.norm(one - last))
+        if chord > step:
+            last, gone = one, gone + chord
+        if gone > length:
+            return k
+    return None
 
 
 def _pairs(recording: Recording, gnss: GnssStream, solution: Track) -> tuple[Array, Array]:
@@ -114,7 +130,8 @@ def _pairs(recording: Recording, gnss: GnssStream, solution: Track) -> tuple[Arr
         shown &= ~((gnss.time > first) & (gnss.time < last))
     if shown.any():
         begin = min(int(np.searchsorted(solution.time, gnss.time[shown][0])), len(way) - 1)
-        far = np.flatnonzero(np.linalg.norm(way[:, :2] - way[begin, :2], axis=1)[begin:] > LENGTH)
+        along = np.cumsum(np.linalg.norm(np.diff(way[begin:, :2], axis=0, prepend=way[begin : begin + 1, :2]), axis=1))
+        far = np.flatnonzero((np.linalg.norm(way[begin:, :2] - way[begin, :2], axis=1) > LENGTH) | (along > LONGEST))
         shown &= gnss.time <= (solution.time[begin + far[0]] if len(far) else solution.time[-1])
     fixes = displacement(gnss.position[shown], gnss.position[0], recording.geodetic)[:, :2]
     track = np.column_stack([np.interp(gnss.time[shown], solution.time, way[:, k]) for k in range(2)])

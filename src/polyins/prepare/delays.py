@@ -48,8 +48,13 @@ FARTHEST_FIXES = 25.0
 """s: delays of fixes that are looked for; leap seconds are 18"""
 ROUGH, STEP = 0.5, 0.1
 """s, of the search: everywhere, and near what it finds"""
+SURE_OF_FIXES = 4.0
+"""standard deviations by which a delay of fixes is not zero; they hold what is not known of the antenna"""
 LEAST_FIX_DELAY = 0.05
 """s: below, it is the receiver's own latency"""
+AHEAD_STD = 0.5
+"""m by which an antenna is ahead of the axle that does not steer, or behind it: its course turns earlier or later than
+the vehicle by that over the speed, which is no delay"""
 ROUGHLY_LIKE, COURSE_LIKE = 0.7, 0.9
 """least correlation of the turns of course and gyros: a vehicle that moves sideways shows none"""
 AS_GOOD = 2.0
@@ -58,6 +63,8 @@ LEAST_TURN = 0.05
 """rad rms, from one displacement to the next"""
 SURE_COURSE = 8.0
 """times the noise of the fixes, least length of a displacement that has a course"""
+LEAST_TURN_STD = 0.005
+"""rad, of a turn however long the displacements are: vehicles roll, and slip sideways"""
 HOPELESS = 2.0
 """s: of fixes that are off by more, and all along, there is no solution"""
 DOUBTFUL, USELESS = 3.0, 10.0
@@ -73,6 +80,8 @@ class _Delay:
     delay: float
     """s; above zero: late"""
     std: float
+    speed: float = 0.0
+    """m/s rms, of a receiver"""
 
 
 def delays(recording: Recording, blocks: Blocks) -> tuple[Finding, ...]:
@@ -98,7 +107,8 @@ def _of_imus(rig: Rig, blocks: Blocks) -> Iterator[Finding]:
         for part in parts:
             if blocks.whole[part, i].mean() < 0.9:
                 continue
-            told = _lag(blocks.rates[part, :3, i], blocks.middle[part, :3], blocks.interval)
+            own = np.ascontiguousarray(blocks.rates[part, :3, i].T)
+            told = _lag(own, np.ascontiguousarray(blocks.middle[part, :3].T), blocks.interval)
             if told is not None:
                 found.append(_Delay(float(blocks.time[part][0]), float(blocks.time[part][-1]), *told))
         off = [one for one in found if abs(one.delay) > max(LEAST_IMU_DELAY, SURE * one.std)]
@@ -111,28 +121,28 @@ def _of_imus(rig: Rig, blocks: Blocks) -> Iterator[Finding]:
 
 
 def _lag(own: Array, mean: Array, interval: float) -> tuple[float, float] | None:
-    """Return by how much one signal, shape (K, 3), is later than another, s, and how sure that is; None: not told.
+    """Return by how much one signal, shape (3, K), is later than another, s, and how sure that is; None: not told.
 
     own(t + D) = mean(t). D is m where the mean square of own(t + m) - mean(t) is least, of means over some blocks; near
     it own(t + m) - mean(t) = (m - D) d mean / dt, which least squares solve.
     """
-    reach, count = round(FARTHEST / interval) // COARSE, len(own) // COARSE
+    reach, count = round(FARTHEST / interval) // COARSE, own.shape[1] // COARSE
     if count < 4 * reach:
         return None
-    own, mean = (one[: count * COARSE] - one.mean(axis=0) for one in (own, mean))
+    own, mean = (one[:, : count * COARSE] - one.mean(axis=1, keepdims=True) for one in (own, mean))
     power = float(np.mean(mean**2))
     if np.sqrt(3.0 * power) < LEAST_TURNING:
         return None
-    rough_own, rough_mean = (one.reshape(count, COARSE, 3).mean(axis=1) for one in (own, mean))
+    rough_own, rough_mean = (one.reshape(3, count, COARSE).mean(axis=2) for one in (own, mean))
     best = int(np.argmin(_misfits(rough_own, rough_mean, reach)))
     if not 0 < best < 2 * reach:
         return None
-    margin = reach * COARSE
-    inside = slice(margin, len(mean) - margin)
-    slope = (mean[margin + 1 : len(mean) - margin + 1] - mean[margin - 1 : len(mean) - margin - 1]) / (2.0 * interval)
+    margin, length = reach * COARSE, mean.shape[1]
+    inside = slice(margin, length - margin)
+    slope = (mean[:, margin + 1 : length - margin + 1] - mean[:, margin - 1 : length - margin - 1]) / (2.0 * interval)
     steepness, m = float(np.sum(slope**2)), (best - reach) * COARSE
     for _ in range(STEPS):
-        off = own[inside.start + m : inside.stop + m] - mean[inside]
+        off = own[:, inside.start + m : inside.stop + m] - mean[:, inside]
         less = float(np.sum(off * slope)) / steepness
         delay, m = m * interval - less, m - round(less / interval)
         if abs(m) > margin:
@@ -143,10 +153,10 @@ def _lag(own: Array, mean: Array, interval: float) -> tuple[float, float] | None
 
 def _misfits(own: Array, mean: Array, reach: int) -> Array:
     """Return the mean squares of own(t + m) - mean(t) for m from -reach to reach; t keeps that from both ends."""
-    known = mean[reach:-reach]
-    products = sum(np.correlate(own[:, a], known[:, a], "valid") for a in range(3))
-    squares = np.concatenate([[0.0], np.cumsum(np.sum(own**2, axis=1))])
-    return np.asarray(squares[len(known) :] - squares[: -len(known)] - 2.0 * products + np.sum(known**2)) / known.size
+    known = mean[:, reach:-reach]
+    products = sum(np.correlate(own[a], known[a], "valid") for a in range(3))
+    squares, length = np.concatenate([[0.0], np.cumsum(np.sum(own**2, axis=0))]), known.shape[1]
+    return np.asarray(squares[length:] - squares[:-length] - 2.0 * products + np.sum(known**2)) / known.size
 
 
 # --- fixes ------------------------------------------------------------------------------------------------------------
@@ -161,28 +171,46 @@ class _Turns:
     end: Array
     turned: Array
     """rad (K,)"""
+    std: Array
+    """rad (K,)"""
     speed: Array
-    """m/s (K,)"""
+    """m/s (K, 2): before and after"""
 
     def at(self, rows: slice) -> _Turns:
-        return _Turns(self.begin[rows], self.end[rows], self.turned[rows], self.speed[rows])
+        return _Turns(self.begin[rows], self.end[rows], self.turned[rows], self.std[rows], self.speed[rows])
+
+    def by_gyros(self, time: Array, yaw: Array, delays: Array) -> Array:
+        """Return what the gyros turned, at each delay, (D, K); `yaw` is what they turned up to `time`, rad."""
+        ends = np.stack([self.begin - delays[:, None], self.end - delays[:, None]])
+        return np.asarray(np.diff(np.interp(ends, time, yaw), axis=0)[0])
+
+    def ahead(self, time: Array, yaw: Array, delay: float) -> Array:
+        """Return by how much more the course turns for each metre that the antenna is ahead of the axle, rad/m (K,).
+
+        There the velocity makes an angle of rate over speed with the vehicle.
+        """
+        ends = np.stack([self.begin - delay, self.end - delay], axis=1)
+        rate = (np.interp(ends + STEP, time, yaw) - np.interp(ends - STEP, time, yaw)) / (2.0 * STEP)
+        return np.asarray(np.diff(rate / self.speed, axis=1)[:, 0])
+
+    def centred(self, turned: Array) -> Array:
+        """Return turns, (..., K), less their mean, each over its std, whose largest weight is 1."""
+        weight = (self.std.min() / self.std) ** 2
+        mean = np.sum(weight * turned, axis=-1, keepdims=True) / weight.sum()
+        return np.asarray(np.sqrt(weight) * (turned - mean))
 
 
 def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Finding]:
     turns = _turns(gnss, geodetic)
     steps = np.diff(blocks.time, prepend=blocks.time[0] - blocks.interval)
     yaw = np.cumsum(blocks.middle[:, 2] * steps)
-    found, speeds = [], []
-    for first in range(0, len(turns.begin) - LEAST_TURNS + 1, TURNS):
-        part = turns.at(slice(first, first + TURNS))
-        told = _best(blocks.time, yaw, part) if len(part.begin) >= LEAST_TURNS else None
-        if told is not None:
-            found.append(_Delay(float(part.begin[0]), float(part.end[-1]), *told))
-            speeds.append(float(np.sqrt(np.mean(part.speed**2))))
-    off = [k for k, one in enumerate(found) if abs(one.delay) > max(LEAST_FIX_DELAY, SURE * one.std)]
+    parts = [turns.at(slice(k, k + TURNS)) for k in range(0, len(turns.begin) - LEAST_TURNS + 1, TURNS)]
+    found = list(_told(blocks.time, yaw, parts))
+    # what no part is sure of all of them may be
+    off = _late(found) or _late(list(_told(blocks.time, yaw, [turns])))
     if not off:
         return
-    size = _typical([found[k] for k in off])
+    size = _typical(off)
     if abs(size) > HOPELESS and 1 < len(off) == len(found) and all(abs(one.delay - size) < STEP for one in found):
         late = "late" if size > 0.0 else "early"
         raise InputError(
@@ -190,9 +218,21 @@ def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Find
             f" gnss.clock_offset_s: {-size:.1f} corrects that"
         )
     std = float(np.median(gnss.position_std[:, :2]))
-    moves = abs(size) * max(speeds[k] for k in off) / std
+    moves = abs(size) * max(one.speed for one in off) / std
     severity: Severity = "serious" if moves > USELESS else "doubt" if moves > DOUBTFUL else "note"
-    yield _finding("GNSS position", [found[k] for k in off], size, severity)
+    yield _finding("GNSS position", off, size, severity)
+
+
+def _told(time: Array, yaw: Array, parts: Sequence[_Turns]) -> Iterator[_Delay]:
+    for part in parts:
+        told = _best(time, yaw, part) if len(part.begin) >= LEAST_TURNS else None
+        if told is not None:
+            speed = float(np.sqrt(np.mean(part.speed**2)))
+            yield _Delay(float(part.begin[0]), float(part.end[-1]), *told, speed)
+
+
+def _late(found: Sequence[_Delay]) -> list[_Delay]:
+    return [one for one in found if abs(one.delay) > max(LEAST_FIX_DELAY, SURE_OF_FIXES * one.std)]
 
 
 def _turns(gnss: GnssStream, geodetic: bool) -> _Turns:
@@ -208,7 +248,10 @@ def _turns(gnss: GnssStream, geodetic: bool) -> _Turns:
     known = np.abs(along) > SURE_COURSE * noise
     step = np.diff(time)
     k = np.flatnonzero(known[1:] & known[:-1] & (step < 3.0 * np.median(step))) if len(step) else np.zeros(0, int)
-    return _Turns(time[k], time[k + 1], np.angle(along[k + 1] / along[k]), speed[k])
+    course_std = noise / np.maximum(np.abs(along), 1e-12)
+    std = np.sqrt(course_std[k] ** 2 + course_std[k + 1] ** 2 + LEAST_TURN_STD**2)
+    both = np.column_stack([speed[k], speed[k + 1]])
+    return _Turns(time[k], time[k + 1], np.angle(along[k + 1] / along[k]), std, both)
 
 
 def _best(time: Array, yaw: Array, turns: _Turns) -> tuple[float, float] | None:
@@ -216,10 +259,10 @@ def _best(time: Array, yaw: Array, turns: _Turns) -> tuple[float, float] | None:
 
     `yaw` is what they turned up to `time`, rad.
     """
-    own = turns.turned - turns.turned.mean()
+    own = turns.centred(turns.turned)
     first, last = max(-FARTHEST_FIXES, turns.end[-1] - time[-1]), min(FARTHEST_FIXES, turns.begin[0] - time[0])
     rough = ROUGH * np.arange(np.ceil(first / ROUGH), np.floor(last / ROUGH) + 1.0)
-    if len(rough) < 3 or np.sqrt(np.mean(own**2)) < LEAST_TURN:
+    if len(rough) < 3 or np.std(turns.turned) < LEAST_TURN:
         return None
     likes = _likes(time, yaw, turns, own, rough)[0]
     found = []
@@ -227,12 +270,10 @@ def _best(time: Array, yaw: Array, turns: _Turns) -> tuple[float, float] | None:
         near = peak + STEP * np.arange(-round(ROUGH / STEP), round(ROUGH / STEP) + 1)
         likes, shifted = _likes(time, yaw, turns, own, near)
         for best in _peaks(likes, COURSE_LIKE):
-            low, top, high = likes[best - 1 : best + 2]
-            fraction = 0.5 * (low - high) / min(low - 2.0 * top + high, -1e-12)
             slope = (shifted[best + 1] - shifted[best - 1]) / (2.0 * STEP)
-            left = float(np.mean((own - shifted[best]) ** 2))
-            std = float(np.sqrt(left / max(float(slope @ slope), 1e-12)))
-            found.append((1.0 - top, float(near[best] + fraction * STEP), std))
+            ahead = turns.centred(turns.ahead(time, yaw, float(near[best])))
+            more, std = _more(own - shifted[best], slope, ahead)
+            found.append((1.0 - float(likes[best]), float(near[best]) + more, std))
     if not found:
         return None
     # where bends come again and again several delays fit as well: the least is the likeliest
@@ -241,11 +282,24 @@ def _best(time: Array, yaw: Array, turns: _Turns) -> tuple[float, float] | None:
     return delay, std
 
 
+def _more(left: Array, slope: Array, ahead: Array) -> tuple[float, float]:
+    """Return by how much a delay is larger than the one that leaves this, s, and its std, s.
+
+    left = slope x delay + ahead x place of the antenna, of which `AHEAD_STD` is known: it tells less of the delay than
+    it seems where all bends are taken at one speed.
+    """
+    design = np.column_stack([slope, ahead])
+    variance = float(np.mean(left**2))
+    for _ in range(STEPS):
+        normal = design.T @ design + np.diag([1e-12, variance / AHEAD_STD**2])
+        solved = np.linalg.solve(normal, design.T @ left)
+        variance = float(np.mean((left - design @ solved) ** 2))
+    return float(solved[0]), float(np.sqrt(variance * np.linalg.inv(normal)[0, 0]))
+
+
 def _likes(time: Array, yaw: Array, turns: _Turns, own: Array, delays: Array) -> tuple[Array, Array]:
     """Return the correlation of turns at each delay, (D,), and what the gyros turned, (D, K)."""
-    ends = np.stack([turns.begin - delays[:, None], turns.end - delays[:, None]])
-    by_gyros = np.diff(np.interp(ends, time, yaw), axis=0)[0]
-    shifted = by_gyros - by_gyros.mean(axis=1, keepdims=True)
+    shifted = turns.centred(turns.by_gyros(time, yaw, delays))
     size = np.linalg.norm(shifted, axis=1) * np.linalg.norm(own)
     return shifted @ own / np.maximum(size, 1e-12), shifted
 

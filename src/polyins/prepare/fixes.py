@@ -1,4 +1,4 @@
-"""What is looked for in fixes before any filter sees them: positions that repeat, stamps that leap, long outages.
+"""What is looked for in fixes before any filter sees them: repeated positions, other units, leaps of stamps, outages.
 
 The fixes are used as they are: what a finding says, the receiver's judge has to live with.
 """
@@ -18,6 +18,14 @@ REPEATED = 3
 """fixes in a row at one place, to the last digit"""
 MOVED = 5.0
 """standard deviations from there to the fix that follows: less, and the vehicle may stand"""
+UNITS = (("feet", 1.0 / 0.3048), ("cm", 100.0), ("mm", 1000.0))
+"""in which heights may be for a while, and how many of them are a metre"""
+SAME_HEIGHT = 0.02
+"""relative, by which a height may change from one fix to the next beside its unit"""
+LEAST_HEIGHT = 5.0
+"""m: lower ones tell no unit"""
+NEAR_ZERO, FAR_FROM_ZERO = 1e-5, 1e-3
+"""rad: latitudes and longitudes of a receiver without a fix, and those that are so by no chance"""
 WEEK_S = 604800.0
 GONE_S, GONE_INTERVALS = 10.0, 5.0
 """s, and times the usual interval: a longer time without fixes is an outage"""
@@ -27,7 +35,8 @@ def of_fixes(gnss: GnssStream, geodetic: bool, end: float) -> tuple[Finding, ...
     """Return what is wrong with fixes; `end`: of the IMUs' data, s."""
     if len(gnss.time) < 2:
         return ()
-    return (*_frozen(gnss, geodetic), *_leaps(gnss), *_outages(gnss, end))
+    nowhere = _nowhere(gnss) if geodetic else ()
+    return (*_frozen(gnss, geodetic), *_units(gnss), *nowhere, *_leaps(gnss), *_outages(gnss, end))
 
 
 def _frozen(gnss: GnssStream, geodetic: bool) -> Iterator[Finding]:
@@ -55,6 +64,52 @@ def _frozen(gnss: GnssStream, geodetic: bool) -> Iterator[Finding]:
         size=size,
         expected=0.0,
         remedy="the receiver repeats itself: leave such fixes out, or state their std",
+    )
+
+
+def _units(gnss: GnssStream) -> Iterator[Finding]:
+    """Say where heights are in another unit for a while: they leap by its factor, and back."""
+    height, std = np.abs(gnss.position[:, 2]), gnss.position_std[:, 2]
+    leaps = np.abs(np.diff(height)) > MOVED * np.hypot(std[1:], std[:-1])
+    told = leaps & (np.minimum(height[1:], height[:-1]) > LEAST_HEIGHT)
+    ratio = np.divide(height[1:], height[:-1], out=np.ones(len(told)), where=told)
+    for unit, factor in UNITS:
+        begins = np.flatnonzero(np.abs(ratio / factor - 1.0) < SAME_HEIGHT) + 1
+        if not begins.size:
+            continue
+        begin, ends = int(begins[0]), np.flatnonzero(np.abs(ratio * factor - 1.0) < SAME_HEIGHT)
+        ends = ends[ends >= begin]
+        last = int(ends[0]) if ends.size else len(height) - 1
+        yield Finding(
+            "units",
+            f"{STREAM}: {last - begin + 1} heights from {gnss.time[begin]:.2f} to {gnss.time[last]:.2f} s are"
+            f" {ratio[begin - 1]:.4g} times that before, as if they were in {unit}",
+            stream=STREAM,
+            axis="height",
+            from_s=float(gnss.time[begin]),
+            to_s=float(gnss.time[last]),
+            size=float(ratio[begin - 1]),
+            expected=1.0,
+            remedy="convert them, or leave such fixes out",
+        )
+
+
+def _nowhere(gnss: GnssStream) -> Iterator[Finding]:
+    """Say where latitude and longitude are next to zero, which those of the others are not."""
+    off = np.abs(gnss.position[:, :2]).max(axis=1)
+    rows = np.flatnonzero(off < NEAR_ZERO)
+    if not rows.size or np.median(off) < FAR_FROM_ZERO:
+        return
+    begin_s, end_s = float(gnss.time[rows[0]]), float(gnss.time[rows[-1]])
+    yield Finding(
+        "place",
+        f"{STREAM}: {rows.size} fixes at latitude and longitude 0 from {begin_s:.2f} to {end_s:.2f} s: the receiver had"
+        " none, or counts in other units",
+        stream=STREAM,
+        from_s=begin_s,
+        to_s=end_s,
+        size=float(np.degrees(off[rows].max())),
+        remedy="leave such fixes out",
     )
 
 

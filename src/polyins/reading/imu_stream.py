@@ -140,7 +140,7 @@ def _within_range(rows: ImuRows, entry: ImuEntry) -> tuple[ImuRows, tuple[str, .
     count = int(np.sum(saturated))
     if not count:
         return rows, ()
-    if count > MOST_SATURATED * len(rates):
+    if count > MOST_SATURATED * len(rates) and not rows.units_known:
         raise InputError(
             f"{rows.source.path}: {count} of {len(rates)} rows reach the gyro's full scale, {limit:g} deg/s; expected "
             "few: gyro_range_deg_s or the unit is wrong, or the sensor does not suit"

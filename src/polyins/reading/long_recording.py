@@ -86,7 +86,7 @@ class LongRecording:
     def pauses(self) -> list[Pause]:
         """Return where no IMU has data for hopelessly long, see `restart`."""
         edges = [[(-np.inf, one.first), *one.gaps, (one.last, np.inf)] for one in self.extents]
-        return common_pauses(edges, hopeless(self.head.rig.has_wheels, self.head.gnss is not None))
+        return common_pauses(edges, hopeless(self.head.rig.has_wheels))
 
     def parts(self, found: Sequence[Pause]) -> Iterator[tuple[Pause | None, LongRecording]]:
         """Give the parts between pauses, each with the one before it."""

@@ -40,6 +40,18 @@ TARGETS = (
         print_tables="polyins.studies.robustness.lies:print_tables",
     ),
     Target(
+        "gaps",
+        "polyins.studies.robustness.gaps:reproduce",
+        seconds=(15, 240),
+        print_tables="polyins.studies.robustness.gaps:print_tables",
+    ),
+    Target(
+        "slips",
+        "polyins.studies.robustness.slips:reproduce",
+        seconds=(5, 30),
+        print_tables="polyins.studies.robustness.slips:print_tables",
+    ),
+    Target(
         "robustness",
         "polyins.studies.robustness.table:reproduce",
         seconds=(50, 240),

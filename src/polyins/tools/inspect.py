@@ -19,6 +19,8 @@ from polyins.model.rig import DEG
 from polyins.reading.guess import Stream, read_stream
 
 Facts = dict[str, Any]
+LARGE = 1e8
+"""from which on numbers are written with all digits before the point: Unix time"""
 
 
 def inspect(path: str | Path) -> Facts:
@@ -100,7 +102,9 @@ def listing(facts: Facts, indent: str = "") -> str:
 def _in_words(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(_in_words(item) for item in value)
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.10g}" if abs(value) < LARGE else f"{value:.6f}"
+    return str(value)
 
 
 def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
@@ -148,14 +152,14 @@ def _timing(time: Array) -> Facts:
     worst = gaps[np.argmax(steps[gaps])] if len(gaps) else None
     return {
         "rows": len(time),
-        "begin_s": _number(time[0]) if len(time) else None,
-        "end_s": _number(time[-1]) if len(time) else None,
+        "begin_s": _stamp(time[0]) if len(time) else None,
+        "end_s": _stamp(time[-1]) if len(time) else None,
         "duration_s": _number(time[-1] - time[0]) if len(time) else None,
         "rate_hz": _number(1.0 / usual) if usual > 0 else None,
         "gaps": {
             "count": len(gaps),
             "largest_s": None if worst is None else _number(steps[worst]),
-            "at_s": None if worst is None else _number(time[worst]),
+            "at_s": None if worst is None else _stamp(time[worst]),
         },
         "repeated_stamps": int(np.sum(steps == 0.0)),
         "unsorted_stamps": int(np.sum(steps < 0.0)),
@@ -193,7 +197,7 @@ def _positions(track: Track) -> Facts:
     names = ("latitude_deg", "longitude_deg") if track.geodetic else ("north_m", "east_m")
     return {
         "geodetic": track.geodetic,
-        "heights": "sea-level" if track.above_sea else "ellipsoidal" if track.geodetic else "local",
+        "heights": _heights(track),
         "first": {name: _number(value) for name, value in zip((*names, "height_m"), first, strict=True)},
         "median_std_m": None if std is None else [_number(value) for value in np.median(std, axis=0)],
         "velocity": track.velocity is not None,
@@ -203,6 +207,19 @@ def _positions(track: Track) -> Facts:
     }
 
 
+def _heights(track: Track) -> str:
+    if not track.geodetic:
+        return "local"
+    if not track.datum_known:
+        return "unknown"
+    return "sea-level" if track.above_sea else "ellipsoidal"
+
+
 def _number(value: Any) -> float | None:
     """Return a number that JSON knows, to 12 digits."""
     return float(f"{float(value):.12g}") if np.isfinite(value) else None
+
+
+def _stamp(value: Any) -> float | None:
+    """Return a stamp that JSON knows, to 1 ns: Unix time needs more digits than other numbers."""
+    return round(float(value), 9) if np.isfinite(value) else None

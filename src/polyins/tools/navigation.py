@@ -28,6 +28,7 @@ from polyins.navigate.choice import Choice, choose
 from polyins.navigate.restart import Known, Pause
 from polyins.prepare.alignment import Start
 from polyins.prepare.data_findings import of_data
+from polyins.prepare.radii import of_radii
 from polyins.prepare.timesync import Aligned
 from polyins.reading.long_recording import STRETCH_S, LongRecording
 from polyins.report.decimation import kept_for_display
@@ -82,7 +83,8 @@ def run(
                 part, errors = _thinned(part, errors, float(share))
             shown.append((part, errors))
         solution = Solution.joined([part for part, _ in shown])
-        found = replace(solution, findings=(*solution.findings, *of_measurements(solution.measurements)))
+        told = solution.findings
+        found = replace(solution, findings=(*told, *of_measurements(solution.measurements, told)))
         for writer in writers:
             writer.finish(found)
     judged = [errors for _, errors in shown if errors is not None]
@@ -99,7 +101,7 @@ def _parts(
     if isinstance(recording, Recording):
         yield batch.run(recording, row.name, imu=imu, progress=progress)
         return
-    choice = choose(row, recording.head.rig, imu)
+    choice, of_wheels = choose(row, recording.head.rig, imu), of_radii(recording.head)
     recording, choice = recording.subset(choice.all), choice.renumbered()
     span = min(one.first for one in recording.extents), max(one.last for one in recording.extents)
 
@@ -112,7 +114,8 @@ def _parts(
             yield solution, known
 
     for part in restart.run_parts(recording.parts(recording.pauses()), of_part, LongRecording.rest):
-        yield replace(part, recording_span=span)
+        found = (*part.findings, *(one for one in of_wheels if one not in part.findings))
+        yield replace(part, recording_span=span, findings=found)
 
 
 def _stretched(
@@ -135,7 +138,7 @@ def _stretched(
         )
         solution, known = batch.navigated(run)
         yield replace(solution, findings=found), known
-        if known.broken:
+        if known.ended:
             return
     if run is None:
         raise InputError(f"start: at {start.time:.3f} s, with an end at {end:.3f} s; expected an end after the start")

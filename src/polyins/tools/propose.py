@@ -18,8 +18,8 @@ from polyins.files import find
 from polyins.formats import geoid, rtklib, table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
-from polyins.formats.rows import ImuRows, SensorRows, Track
-from polyins.model.axes import axes_matrix, right_handed_axes
+from polyins.formats.rows import ImuRows, SensorRows, Track, intervals
+from polyins.model.axes import axes_matrix, composed, right_handed_axes
 from polyins.model.findings import Finding
 from polyins.model.recording import Recording, usual_interval
 from polyins.model.rig import DEG, HOUR
@@ -32,9 +32,14 @@ from polyins.tools.inspect import describe
 CHECK = "# CHECK:"
 TRACK_FORMATS = {"kf-gins-gnss": "kf-gins"}
 GRADE = "consumer-mems"
+SENSOR_AXES: Axes = ("x", "y", "z")
 FEWEST_SHAKEN = 100
 """rows that tell how much they shake"""
 MEDIAN_TO_STD = 1.4826
+SLOWEST_RAD_S = 0.1
+"""less than that hardly turns: biases of cheap gyros are as large"""
+STANDING_M_S = 0.1
+"""less than that a reference says of what stands"""
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
 BY_UTC = "by what both files say of UTC; an autopilot knows it to a tenth of a second; time_offset: estimate finds more"
@@ -95,9 +100,18 @@ def propose(paths: Sequence[str | Path]) -> str:
     for number, imu in enumerate(imus, 1):
         lines += _imu_lines(number, imu, imus[0], speeds)
     span = (max(one.rows.time[0] for one in imus), min(one.rows.time[-1] for one in imus))
-    # A file with attitude is a reference rather than a receiver's, and one computed afterwards better than the log's.
-    tracks.sort(key=lambda one: (isinstance(one.rows, Track) and one.rows.attitude is not None, one.log is not None))
-    only_solution = len(tracks) == 1 and not tracks[0].log and data_format(tracks[0].path) == "kf-gins-nav"
+    # Another system's solution comes last, one with attitude is a reference rather than a receiver's, if there is a
+    # choice, and positions computed afterwards are better than the log's.
+    tracks.sort(
+        key=lambda one: (
+            _is_estimate(one),
+            isinstance(one.rows, Track) and one.rows.attitude is not None,
+            one.log is not None,
+        )
+    )
+    only_solution = bool(tracks) and _is_estimate(tracks[0])
+    if len(tracks) > 2 and _is_estimate(tracks[-1]) and not _is_estimate(tracks[1]):
+        tracks.insert(1, tracks.pop())
     sections = ["reference"] if only_solution else ["gnss", "reference"]
     if len(tracks) > 1 and _is_receiver(tracks[1]):
         sections = sections[:1]
@@ -110,7 +124,9 @@ def propose(paths: Sequence[str | Path]) -> str:
         lines += ["", "odometer:", *_odometer_lines(speed, imus[0])]
     for height in _sensors(read, "height")[:1] if "gnss" in sections[: len(tracks)] else []:
         lines += ["", "height:", *_barometer_lines(height, imus[0])]
-    lines += ["", "start:", _start_line(bool(tracks) and not only_solution, tracks, headings)]
+    same_log = only_solution and tracks[0].log is not None and tracks[0].log is imus[0].log
+    given = _given_start(tracks[0], span) if same_log and not headings else []
+    lines += ["", "start:", *(given or [_start_line(bool(tracks) and not only_solution, tracks, headings)])]
     return "\n".join(lines) + "\n"
 
 
@@ -195,9 +211,16 @@ def _sources(paths: Sequence[str | Path]) -> tuple[list[LogSource], list[str]]:
     return found, [*left_out, *(f"not used: {error}" for error in refused)]
 
 
+def _is_estimate(of: LogSource) -> bool:
+    """Whether positions are another system's solution by their format: no measurements."""
+    if of.log is not None:
+        return of.stream in of.log.references
+    return data_format(of.path) == "kf-gins-nav"
+
+
 def _is_receiver(of: LogSource) -> bool:
     """Whether positions are those of a log's receiver, which judge nothing."""
-    return of.log is not None and isinstance(of.rows, Track) and of.rows.attitude is None
+    return of.log is not None and not _is_estimate(of) and isinstance(of.rows, Track) and of.rows.attitude is None
 
 
 def _comments(texts: Sequence[str]) -> list[str]:
@@ -214,6 +237,24 @@ def _start_line(gnss: bool, tracks: list[LogSource], headings: list[LogSource]) 
     if any(isinstance(one.rows, Track) and one.rows.attitude is not None for one in tracks):
         return f"  heading_from: auto  {CHECK} that of the reference"
     return f"  heading_deg: 0.0  {CHECK} clockwise from north; no file tells it"
+
+
+def _given_start(of: LogSource, span: tuple[float, float]) -> list[str]:
+    """Return the state that a log's reference has when the IMUs begin: without other aids nothing tells it better."""
+    track = of.rows
+    assert isinstance(track, Track)
+    if track.velocity is None or track.attitude is None or track.time[-1] < span[0]:
+        return []
+    row = int(np.searchsorted(track.time, span[0]))
+    roll, pitch, heading = (float(angle) for angle in np.round(track.attitude[row] / DEG, 6))
+    velocity = [float(value) for value in np.round(track.velocity[row], 6)]
+    return [
+        f"  time_s: {float(track.time[row])!r}  {CHECK} the state is that of the reference",
+        f"  velocity_m_s: {_flow(velocity)}",
+        f"  roll_pitch_deg: {_flow([roll, pitch])}",
+        f"  heading_deg: {heading}",
+        *(["  estimate_gyro_bias: false  # it moves"] if np.linalg.norm(velocity) > STANDING_M_S else []),
+    ]
 
 
 def _sensors(read: Sequence[LogSource], kind: str) -> list[LogSource]:
@@ -237,15 +278,19 @@ def _imu_lines(number: int, imu: LogSource, first: LogSource, speeds: list[LogSo
     return [
         *lines,
         *_axes_lines(imu, facts, speeds),
-        f"    position_m: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m",
-        _noise_line(imu.rows),
+        _point_line("    position_m", imu),
+        _noise_line(imu.rows, imu.log.noise.get(imu.stream) if imu.log else None),
     ]
 
 
-def _noise_line(rows: ImuRows) -> str:
-    """Return a grade, or where the rows shake more than that the random walks that this makes."""
+def _noise_line(rows: ImuRows, stated: tuple[float, float] | None = None) -> str:
+    """Return a grade, or where the rows shake more than that, or than the log states, the random walks of this."""
     angle, velocity = shaking(rows)
     usual = NOISE_GRADES[GRADE]
+    if stated is not None:
+        angle, velocity = max(angle, stated[0]) / DEG * np.sqrt(HOUR), max(velocity, stated[1]) * np.sqrt(HOUR)
+        given = f"angle_random_walk_deg_sqrt_h: {angle:.3g}, velocity_random_walk_m_s_sqrt_h: {velocity:.3g}"
+        return f"    noise: {{grade: {GRADE}, {given}}}  {CHECK} what the log states, or shakes from row to row if more"
     grades = f"a grade ({', '.join(NOISE_GRADES)}) or figures"
     walks = {
         "angle_random_walk_deg_sqrt_h": angle / DEG * np.sqrt(HOUR),
@@ -276,7 +321,15 @@ def shaking(rows: ImuRows) -> tuple[float, float]:
 
 def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) -> list[str]:
     if imu.log is not None and imu.log.upright:
-        return ["    axes: [x, y, z]  # forward, right, down, as the format has them"]
+        own = imu.log.axes.get(imu.stream, SENSOR_AXES)
+        return [f"    axes: [{', '.join(own)}]  # forward, right, down, as the format has them"]
+    if imu.log is not None and (imu.log.axes or imu.stream in imu.log.points):
+        axes = composed(_shared_axes(imu.log), imu.log.axes.get(imu.stream, SENSOR_AXES))
+        return [
+            f"    axes: [{', '.join(axes)}]  {CHECK} as the log has them to each other, turned upright; "
+            f"{FORWARD_IS_A_GUESS}",
+            f"    mount_deg: [0, 0, 0]  {CHECK} roll, pitch, yaw that the axes are off by, deg",
+        ]
     force = np.array(facts["accel_mean_m_s2"] or [0.0, 0.0, -9.8], dtype=float)
     axes = upright_axes(("x", "y", "z"), force)
     mean = ", ".join(f"{value:.1f}" for value in force)
@@ -290,6 +343,29 @@ def _axes_lines(imu: LogSource, facts: dict[str, Any], speeds: list[LogSource]) 
         f"    axes: [{', '.join(axes)}]  {CHECK} sensor axes that point forward, right, down; {forward}",
         f"    mount_deg: [0, 0, 0]  {CHECK} roll, pitch, yaw that the axes are off by, deg",
     ]
+
+
+def _shared_axes(log: Log) -> Axes:
+    """Return which of the axes that a log's IMUs share point forward, right, down, by their force while they rest."""
+    forces = [axes_matrix(log.axes.get(name, SENSOR_AXES)) @ _force_at_rest(rows) for name, rows in log.imus.items()]
+    force = np.mean(forces, axis=0)
+    return SENSOR_AXES if log.upright or not force.any() else upright_axes(SENSOR_AXES, force)
+
+
+def _force_at_rest(rows: ImuRows) -> np.ndarray:
+    """Return the mean specific force, shape (3,), of the rows that hardly turn; of all if these are few."""
+    steps = intervals(rows.time)
+    resting = np.linalg.norm(rows.dtheta, axis=1) < SLOWEST_RAD_S * steps
+    chosen = resting if resting.sum() >= FEWEST_SHAKEN else steps > 0.0
+    return np.asarray(rows.dvel[chosen].sum(axis=0) / max(float(steps[chosen].sum()), 1e-9))
+
+
+def _point_line(key: str, of: LogSource) -> str:
+    """Return where a sensor is, as the log says, or that nobody knows."""
+    if of.log is not None and of.stream in of.log.points:
+        point = axes_matrix(_shared_axes(of.log)) @ np.array(of.log.points[of.stream])
+        return f"{key}: {_flow([round(float(value), 6) + 0.0 for value in point])}  {CHECK} as the log says"
+    return f"{key}: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m"
 
 
 def forward_axes(axes: Axes, rows: ImuRows, speed: SensorRows) -> tuple[Axes, float, float]:
@@ -378,10 +454,11 @@ def _track_lines(section: str, of: LogSource, first: LogSource, span: tuple[floa
     if section == "gnss" and antenna is not None:
         lines.append(f"  antenna_position_m: {_flow(list(antenna))}  {CHECK} as the log's parameters say")
     else:
-        point = "antenna_position_m" if section == "gnss" else "point_m"
-        lines.append(f"  {point}: [0, 0, 0]  {CHECK} forward, right, down from the array's origin, m")
+        lines.append(_point_line("  antenna_position_m" if section == "gnss" else "  point_m", of))
     if section == "gnss" and track.position_std is None:
         lines.append(f"  position_std_m: [1.5, 1.5, 3.0]  {CHECK} north, east, down; the file has none")
+    if not track.datum_known:
+        lines.append(f"  height: ellipsoidal  {CHECK} the log does not tell what heights are above; else sea-level")
     if track.above_sea:
         lines.append(_height_line())
     return lines

@@ -14,12 +14,13 @@ from exported import known
 import polyins as pi
 from polyins.errors import InputError
 from polyins.formats.solution_files import write_solution
+from polyins.model.findings import Finding
 from polyins.model.status import ALIGNING, ATTITUDE_ONLY, NOT_TO_BE_USED, TRACKING
 from polyins.tools.export.trace import read_trace, trace_of
 from polyins.tools.export.writing import EXPORTS, ExportOptions, export, utc_of, write
 
 GEODETIC = [form.name for form in EXPORTS if form.geodetic]
-OF_DAYS = [form.name for form in EXPORTS if form.utc]
+OF_DAYS = [form.name for form in EXPORTS if form.utc == "needed"]
 
 
 def test_formats_of_latitude_and_longitude_refuse_a_plane_by_name(tmp_path: Path) -> None:
@@ -100,6 +101,15 @@ def test_rows_without_a_state_are_left_out_and_counted(tmp_path: Path) -> None:
     _, made = known(status=np.full_like(status, NOT_TO_BE_USED))
     with pytest.raises(InputError, match="no row is to be used"):
         export(made, tmp_path / "b.tum", "tum")
+
+
+def test_what_makes_a_result_unusable_is_said_again(tmp_path: Path) -> None:
+    findings = (Finding("noise", "the receiver is noisy", "doubt"), Finding("not finite", "it broke", "serious"))
+    _, made = known(findings=findings)
+    write_solution(made, tmp_path / "run")
+    assert export(made, tmp_path / "a.tum", "tum") == ("single: it broke",)
+    (note,) = write(read_trace(tmp_path / "run"), tmp_path / "b.tum", "tum", ExportOptions())
+    assert note.endswith("solution.parquet: it broke")
 
 
 def test_an_existing_file_stays(tmp_path: Path) -> None:

@@ -10,9 +10,15 @@ from polyins.studies.robustness.fault import Draw, Fault, during, with_fixes, wi
 KINDS = ("gap", "pause", "restart", "silent")
 
 
-def _gap(recording: Recording, draw: Draw, *, length: float, fixes: bool) -> Recording:
+def paused(recording: Recording, at: float, length: float) -> Recording:
+    """Return the recording without the data of any IMU for a while, s."""
     for index, stream in enumerate(recording.imus):
-        recording = with_rows(recording, index, (stream.time < draw.at) | (stream.time >= draw.at + length))
+        recording = with_rows(recording, index, (stream.time < at) | (stream.time >= at + length))
+    return recording
+
+
+def _gap(recording: Recording, draw: Draw, *, length: float, fixes: bool) -> Recording:
+    recording = paused(recording, draw.at, length)
     if recording.gnss is not None and not fixes:
         recording = with_fixes(recording, ~during(recording, draw.at, length))
     return recording

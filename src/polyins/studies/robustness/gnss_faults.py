@@ -10,10 +10,10 @@ import numpy as np
 from polyins.model.recording import Recording
 from polyins.studies.robustness.fault import Array, Draw, Fault, Mask, during, fixes, moved, with_fixes, with_gnss
 
-OFF = ("jump", "reset", "rejected", "drift")
+OFF = ("jump", "reset", "rejected")
 DELAY = ("delay", "clock")
 PLACE = ("place", "jump")
-STD = ("std",)
+UNITS = ("units",)
 WEEK_S = 604800.0
 FOOT = 0.3048
 
@@ -128,30 +128,30 @@ FAULTS = (
         for low, high in ((2.0, 5.0), (7.0, 15.0), (50.0, 150.0))
     ),
     _gnss("wanders off by 0.1 to 0.3 m/s for 60 s", partial(_wander, rates=(0.1, 0.3), length=60.0), OFF),
-    _gnss("std too small by 100", partial(_std, factor=0.01), ("noise", "innovations", *OFF), *STD),
-    _gnss("std too large by 100", partial(_std, factor=100.0), ("too modest",), *STD),
+    _gnss("std too small by 100", partial(_std, factor=0.01), ("noise", "innovations", *OFF), "std"),
+    _gnss("std too large by 100", partial(_std, factor=100.0), ("too modest",), "std"),
     _gnss("noise 1 m, for good", partial(_noise, sizes=(0.7, 1.5), length=np.inf), ("noise",)),
     _gnss("noise 3 m, for 60 s", partial(_noise, sizes=(2.0, 5.0), length=60.0), ("noise",)),
-    _gnss("std zero", partial(_std_is, value=0.0), STD, *STD),
-    _gnss("std negative", partial(_std_is, value=-1.0), STD, *STD),
-    _gnss("std 1e-12", partial(_std_is, value=1e-12), ("noise", *STD, *OFF), *STD),
-    _gnss("std 1e30", partial(_std_is, value=1e30), STD, *STD),
+    _gnss("std zero", partial(_std_is, value=0.0), (), "std"),
+    _gnss("std negative", partial(_std_is, value=-1.0), (), "std"),
+    _gnss("std 1e-12", partial(_std_is, value=1e-12), ("noise", *OFF), "std"),
+    _gnss("std 1e30", partial(_std_is, value=1e30), (), "std"),
     _gnss("repeated position for 5 s", partial(_repeat, length=5.0), ("frozen",)),
     _gnss("repeated position for 10 s", partial(_repeat, length=10.0), ("frozen",)),
-    _gnss("repeated stamp", _repeated_stamp, ("stamps",), "repeated"),
-    _gnss("two fixes in wrong order", _exchanged, ("stamps",), "increasing"),
+    _gnss("repeated stamp", _repeated_stamp, (), "repeated"),
+    _gnss("two fixes in wrong order", _exchanged, (), "increasing"),
     _gnss(
         "latitude and longitude swapped", partial(_values, length=np.inf, change=_swapped, always=True),
-        ("place",), "latitude",
+        (), "latitude",
     ),
     _gnss("latitude and longitude swapped for 5 s", partial(_values, length=5.0, change=_swapped), PLACE, "latitude"),
-    _gnss("height in feet for 10 s", partial(_values, length=10.0, change=partial(_times, factor=1.0 / FOOT)), PLACE),
-    _gnss("angles 1e-7 deg for 5 s", partial(_values, length=5.0, change=_is(NEAR_ZERO, NEAR_ZERO, None)), PLACE),
+    _gnss("height in feet for 10 s", partial(_values, length=10.0, change=partial(_times, factor=1.0 / FOOT)), UNITS),
+    _gnss("angles 1e-7 deg for 5 s", partial(_values, length=5.0, change=_is(NEAR_ZERO, NEAR_ZERO, None)), ("place",)),
     _gnss("angles times 1e7 for 5 s", partial(_values, length=5.0, change=partial(_angles_times, factor=1e7)),
           PLACE, "latitude"),
-    _gnss("height in mm for 5 s", partial(_values, length=5.0, change=partial(_times, factor=1e3)), PLACE, "height"),
-    _gnss("NaN in one fix", partial(_values, length=1.0, change=_is(np.nan, np.nan, np.nan)), ("no data",), "number"),
-    _gnss("NaN for 10 s", partial(_values, length=10.0, change=_is(np.nan, np.nan, np.nan)), ("no data",), "number"),
+    _gnss("height in mm for 5 s", partial(_values, length=5.0, change=partial(_times, factor=1e3)), UNITS, "height"),
+    _gnss("NaN in one fix", partial(_values, length=1.0, change=_is(np.nan, np.nan, np.nan)), (), "number"),
+    _gnss("NaN for 10 s", partial(_values, length=10.0, change=_is(np.nan, np.nan, np.nan)), (), "number"),
     _gnss("(0, 0) in one fix", partial(_values, length=1.0, change=_is(0.0, 0.0, None)), PLACE, "latitude"),
     _gnss("(0, 0, 0) in one fix", partial(_values, length=1.0, change=_is(0.0, 0.0, 0.0)), PLACE, "latitude"),
     _gnss("latitude 91", partial(_values, length=1.0, change=_is(np.radians(91.0), None, None)), PLACE, "latitude"),

@@ -147,7 +147,7 @@ def told_lie(lie: Lie, seed: int) -> dict[str, Any]:
     # the first fix that lies is told from then on
     since = errors.time - float(fixes(recording).time[int(np.argmax(fixes(recording).time >= AT))])
     shown = (since > (FOLLOWED if lie.step else 0.0)) & (since < LATER)
-    findings = (*solution.findings, *of_measurements(solution.measurements))
+    findings = (*solution.findings, *of_measurements(solution.measurements, solution.findings))
     return {
         "horizontal_max_m": float(off[shown].max()),
         "heading_max_deg": float(np.degrees(np.abs(errors.attitude[(since > 0.0) & (since < LATER), 2]).max())),

@@ -12,8 +12,9 @@ from polyins.simulation.scenario import Scenario
 from polyins.simulation.wheel_scenario import Slip
 from polyins.studies.robustness.fault import Draw, Fault, unchanged, with_imu, with_rows
 
-SLIP = ("slip", "scale", "speed")
-SICK = ("left out", "silent", "gap", "dead", "frozen", "no data", "disagreement", "slip", "out of range", "sign")
+SLIP = ("slip", "wheel")
+SICK = ("left out", "silent", "gap", "disagreement", "slip")
+ALL_SILENT = ("pause", "restart", *SICK)
 WORDS = ("spin", "wheel", "same values", "number")
 
 
@@ -110,6 +111,8 @@ def _slips(name: str, size: float, length: float, all_wheels: bool) -> Fault:
 
 def _parts(name: str, names: tuple[str, ...], length: float, value: str) -> Fault:
     inject = partial(_part, names=names, length=length, value=value)
+    if len(names) > 1:
+        return Fault(name, "wheel", inject, ALL_SILENT, WORDS)
     return Fault(name, "wheel", inject, SICK, WORDS, whose=names[0])
 
 
@@ -121,11 +124,11 @@ ON_WHEELS = (
     _slips("one wheel slips up to 100 % for 3 s", 1.0, 3.0, False),
     _slips("both wheels slip up to 20 % for 5 s", 0.2, 5.0, True),
     _slips("both wheels slip up to 100 % for 3 s", 1.0, 3.0, True),
-    Fault("radius of one wheel 4 to 8 % off", "wheel", unchanged, (*SLIP, "radius"), WORDS,
+    Fault("radius of one wheel 4 to 8 % off", "wheel", unchanged, SLIP, WORDS,
           scenario=partial(_scale, all_wheels=False)),
     *(
         Fault(f"{who}: spin {what}", "wheel", partial(_gyro, name=who, axis=0, factor=factor, bias=bias, always=always),
-              ("sign", "disagreement", *SLIP), WORDS)
+              ("disagreement", *SLIP), WORDS)
         for who, what, factor, bias, always in (
             ("left", "of the wrong sign", -1.0, 0.0, True),
             ("left", "of the wrong sign from then on", -1.0, 0.0, False),

@@ -36,8 +36,8 @@ class ExportFormat:
     """module of this folder, and function"""
     geodetic: bool = False
     """it holds latitude and longitude only"""
-    utc: bool = False
-    """it holds times of day only"""
+    utc: Literal["", "told", "needed"] = ""
+    """whether it holds times of day: where they are known, or nothing else"""
     above: Datum | None = None
     """what its heights count from; None: it says so, or they do not matter"""
     otherwise: str = ""
@@ -47,12 +47,12 @@ class ExportFormat:
 EXPORTS: tuple[ExportFormat, ...] = (
     ExportFormat("tum", "TUM trajectory", "poses:write_tum"),
     ExportFormat("kitti", "KITTI poses", "poses:write_kitti"),
-    ExportFormat("kml", "KML", "kml:write", True, True, "the sea", "the track lies on the ground"),
-    ExportFormat("geojson", "GeoJSON", "geojson:write", True, False, "the ellipsoid", "coordinates are without them"),
-    ExportFormat("gpx", "GPX 1.1", "gpx:write", True, True, "the sea", "elevations are left out"),
-    ExportFormat("nmea", "NMEA 0183", "nmea:write", True, True, "the sea", "heights are left out"),
-    ExportFormat("mcap", "MCAP of ROS 2", "mcap:write", above="the ellipsoid", otherwise="fixes are without altitude"),
-    ExportFormat("pos", "RTKLIB .pos", "pos:write", True, True),
+    ExportFormat("kml", "KML", "kml:write", True, "needed", "the sea", "the track lies on the ground"),
+    ExportFormat("geojson", "GeoJSON", "geojson:write", True, "told", "the ellipsoid", "coordinates are without them"),
+    ExportFormat("gpx", "GPX 1.1", "gpx:write", True, "needed", "the sea", "elevations are left out"),
+    ExportFormat("nmea", "NMEA 0183", "nmea:write", True, "needed", "the sea", "heights are left out"),
+    ExportFormat("mcap", "MCAP of ROS 2", "mcap:write", False, "told", "the ellipsoid", "fixes are without altitude"),
+    ExportFormat("pos", "RTKLIB .pos", "pos:write", True, "needed"),
     ExportFormat("csv", "CSV", "csv:write"),
 )
 
@@ -95,9 +95,10 @@ def write(trace: Trace, path: str | Path, to: str, options: ExportOptions) -> tu
         )
     path = new_file(path)
     trace, notes = _placed(trace, form, options)
+    notes += [f"{trace.source}: {one['text']}" for one in trace.findings if one["severity"] == "serious"]
     if to != "csv":
-        trace, left_out = _usable(trace)
-        notes += left_out
+        trace, texts = _usable(trace)
+        notes += texts
     if options.rate_hz is not None:
         trace = trace.at(thinned(trace["time_s"], options.rate_hz))
     writer = _writer(form)
@@ -122,11 +123,11 @@ def _placed(trace: Trace, form: ExportFormat, options: ExportOptions) -> tuple[T
     utc = trace.utc_of_zero
     if options.utc_of_zero is not None:
         utc = utc_of(options.utc_of_zero, float(trace["time_s"][0]))
-    elif utc is None and trace["time_s"][0] > UNIX_TIME:
+    elif form.utc and utc is None and trace["time_s"][0] > UNIX_TIME:
         utc = 0.0
         begin = datetime.fromtimestamp(float(trace["time_s"][0]), UTC)
         notes.append(f"{trace.source}: stamps are taken for Unix time, which begins at {begin:%Y-%m-%d %H:%M:%S} UTC")
-    if form.utc and utc is None:
+    if form.utc == "needed" and utc is None:
         raise InputError(
             f"{trace.source}: nothing tells UTC, which {form.title} needs; expected --utc-of-zero with when time_s is "
             "zero, as 2024-05-01T12:00:00Z, or 'week N' of GPS"

@@ -1,0 +1,217 @@
+"""Gaps in the data of all IMUs: what the standard deviations hold, and how soon the error is what it was.
+
+An array with GNSS, and wheels with it and without; GNSS goes on in the gap. Each is run in a batch, live, and live with
+a checkpoint that is saved before the gap and resumed after it. Live, the state counts that there is at the time.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.evaluation.errors import compare_to_reference
+from polyins.formats.documents import plain
+from polyins.live.replay import Replay
+from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.recording import Recording
+from polyins.model.solution import Solution
+from polyins.navigate import batch
+from polyins.navigate.navigator import Navigator, NavigatorState
+from polyins.navigate.samples import GnssFix, ImuSample, Sample
+from polyins.screen import number, print_table
+from polyins.simulation.run import simulate
+from polyins.simulation.scenario import Fixes, Scenario
+from polyins.studies.robustness.case import SCENARIOS
+from polyins.studies.robustness.gap_faults import paused
+from polyins.tools.parallel import run_all
+
+Array = NDArray[np.float64]
+
+SEEDS = (1, 3, 5)
+LENGTHS, QUICK_LENGTHS = (2.0, 10.0, 30.0, 60.0, 150.0, 600.0), (10.0,)
+"""s"""
+AT, AFTER = 120.0, 110.0
+"""s before a gap, of which the first are a standstill, and after it"""
+INSIDE = 3.0
+"""standard deviations"""
+BACK, IN_A_ROW = 2.0, 3
+"""times the error without a gap, below which it is for so many fixes once it is back"""
+SOON = 0.5
+"""s after a fix: a state that is later is not that of the fix"""
+EVERY = 0.5
+"""s from one look at a live state to the next"""
+WAYS = ("batch", "live", "resumed")
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """What has the gap."""
+
+    name: str
+    scenario: str
+    method: str
+    gnss: bool
+
+
+VEHICLES = (
+    Vehicle("array", "fixes", "enav-fusion", True),
+    Vehicle("wheels with GNSS", "wheels", "triple-ins", True),
+    Vehicle("wheels", "wheels", "triple-ins", False),
+)
+
+
+class Track(NamedTuple):
+    """Errors of a solution, and what it said they might be."""
+
+    time: Array
+    """s, shape (T,)"""
+    horizontal: Array
+    """m, shape (T,)"""
+    over: Array
+    """the larger one of horizontal position and heading over its standard deviation, shape (T,)"""
+
+
+def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
+    """Run every vehicle through every gap, or with `quick` through one of ten seconds, and return the document."""
+    seeds, lengths = (SEEDS[:1], QUICK_LENGTHS) if quick else (SEEDS, LENGTHS)
+    cases = [(vehicle, length) for vehicle in VEHICLES for length in lengths]
+    rows = run_all([partial(_rows, *case, seeds) for case in cases], progress=progress)
+    names = [f"{vehicle.name}: {length:g} s" for vehicle, length in cases]
+    settings = {"seeds": list(seeds), "begins_s": AT, "inside_std": INSIDE, "back": BACK}
+    return {"target": "gaps", "paper": {}, "polyins": plain(dict(zip(names, rows, strict=True))), "settings": settings}
+
+
+def _rows(
+    vehicle: Vehicle, length: float, seeds: tuple[int, ...], progress: Callable[[float], None]
+) -> dict[str, dict[str, Any]]:
+    """Return the figures of each way, over all seeds."""
+    found: dict[str, list[tuple[Track, int | None]]] = {way: [] for way in WAYS}
+    for seed in seeds:
+        whole, end = simulate(scenario(vehicle, length), seed=seed), AT + length
+        usual = track(batch.run(whole, vehicle.method), whole)
+        error = math.sqrt(float(np.mean(usual.horizontal[usual.time > end] ** 2)))
+        recording = paused(whole, AT, length)
+        batched = batch.run(recording, vehicle.method)
+        for way in WAYS:
+            solution = batched if way == "batch" else live(recording, batched, end if way == "resumed" else None)
+            errors = track(solution, whole)
+            found[way].append((errors, _fixes_until_back(errors, whole, end, BACK * error)))
+            progress(sum(map(len, found.values())) / (len(WAYS) * len(seeds)))
+    return {way: _figures(tracks) for way, tracks in found.items()}
+
+
+def _fixes_until_back(errors: Track, recording: Recording, end: float, limit: float) -> int | None:
+    """Return after how many fixes from the end of a gap on the error is below a limit, m; None without fixes."""
+    if recording.gnss is None:
+        return None
+    fixes = recording.gnss.time[(recording.gnss.time >= end) & (recording.gnss.time < errors.time[-1])]
+    rows = np.searchsorted(errors.time, fixes, "right")
+    # a state that is not later than the fix does not know it
+    off = np.where(errors.time[rows] - fixes < SOON, errors.horizontal[rows], np.inf)
+    back = np.all([off[k : len(off) - IN_A_ROW + 1 + k] < limit for k in range(IN_A_ROW)], axis=0)
+    return int(np.argmax(back)) + 1 if back.any() else len(fixes)
+
+
+def _figures(tracks: list[tuple[Track, int | None]]) -> dict[str, Any]:
+    over, back = np.concatenate([track.over for track, _ in tracks]), [one for _, one in tracks]
+    return {
+        "inside_percent": 100.0 * float(np.mean(over < INSIDE)),
+        "error_over_std": float(np.max(over)),
+        "fixes_until_back": None if None in back else max(one for one in back if one is not None),
+    }
+
+
+def scenario(vehicle: Vehicle, length: float) -> Scenario:
+    """Return a drive that is long enough for a gap, s."""
+    known, seconds = SCENARIOS[vehicle.scenario], AT + length + AFTER
+    if known.laps is None:
+        return known.model_copy(update={"duration_s": seconds})
+    around = 2.0 * (known.laps.length_m + known.laps.width_m) / known.laps.speed_m_s
+    laps = known.laps.model_copy(update={"count": math.ceil(seconds / around)})
+    return known.model_copy(update={"laps": laps, "gnss": Fixes() if vehicle.gnss else None})
+
+
+def live(recording: Recording, batched: Solution, resumed: float | None) -> Solution:
+    """Return the states that a navigator has as the samples come, in the place of those of the batch run.
+
+    `resumed`: s, at which it goes on from a checkpoint that was saved before the gap.
+    """
+    navigator = Navigator(
+        recording.rig,
+        recording.start,
+        method=batched.method,
+        options=recording.options,
+        geodetic=recording.geodetic,
+        fixes=recording.gnss is not None,
+    )
+    samples = [one for chunk in Replay(recording).chunks() for one in chunk]
+    states = _fed(navigator, [one for one in samples if resumed is None or one.time < AT], recording)
+    if resumed is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            navigator.save(Path(folder) / "checkpoint")
+            navigator = Navigator.resume(Path(folder) / "checkpoint")
+        states += _fed(navigator, [one for one in samples if one.time >= resumed], recording)
+    return replace(
+        batched,
+        time=np.array([one.time for one in states]),
+        position=np.array([one.position for one in states]),
+        velocity=np.array([one.velocity for one in states]),
+        attitude=np.array([one.attitude for one in states]),
+        position_variance=np.array([one.position_std for one in states]) ** 2,
+        velocity_variance=np.array([one.velocity_std for one in states]) ** 2,
+        phi_covariance=np.array([one.phi_covariance for one in states]),
+        status=None,
+    )
+
+
+def _fed(navigator: Navigator, samples: list[Sample], recording: Recording) -> list[NavigatorState]:
+    """Feed a navigator and look at its state every now and then."""
+    names = [imu.name for imu in recording.rig.imus]
+    states: list[NavigatorState] = []
+    due = -math.inf
+    for one in samples:
+        if isinstance(one, ImuSample):
+            navigator.imu(one.time, one.dtheta, one.dvel, names.index(one.imu))
+        elif isinstance(one, GnssFix) and one.position_std is not None:
+            navigator.gnss(one.time, one.position, one.position_std)
+        if one.time >= due:
+            due, state = one.time + EVERY, navigator.state
+            if state is not None and (not states or state.time > states[-1].time):
+                states.append(state)
+    return states
+
+
+def track(solution: Solution, recording: Recording) -> Track:
+    """Return the errors of a solution."""
+    assert recording.reference is not None
+    errors = compare_to_reference(solution, recording.reference)
+    assert errors.attitude is not None
+    rows = errors.covered
+    variance = euler_variance(euler_angles(solution.attitude[rows]), solution.phi_covariance[rows])
+    position = errors.horizontal / np.sqrt(solution.position_variance[rows, :2].sum(axis=1))
+    heading = np.abs(errors.attitude[:, 2]) / np.sqrt(variance[:, 2])
+    return Track(errors.time, errors.horizontal, np.maximum(position, heading))
+
+
+def print_tables(figures: Mapping[str, Any]) -> None:
+    """Print a row for each vehicle, gap and way."""
+    rows = [
+        [
+            f"{name}, {way}",
+            number(one["inside_percent"], 2),
+            number(one["error_over_std"], 2),
+            number(one["fixes_until_back"]),
+        ]
+        for name, ways in figures.items()
+        for way, one in ways.items()
+    ]
+    columns = ["gap in all IMUs", f"inside {INSIDE:g} std, %", "largest error over std", "fixes until back"]
+    print_table("gaps", columns, rows)
