@@ -240,12 +240,13 @@ def _compare(
 ) -> None:
     from polyins.tools import navigation, results
     from polyins.tools.comparison import compare as run_all
+    from polyins.tools.propose import way_named
 
     out = files.folder
     with progress("reading"):
         recording = _open(_settings(inputs))
     make_folder(out)
-    with compilation_said(), progress("compare") as update:
+    with way_named(inputs), compilation_said(), progress("compare") as update:
         result = run_all(recording, methods, files=files, threads=threads, progress=update)
     with progress("writing"):
         results.write_comparison(out, recording, result, report=not no_report)

@@ -140,6 +140,7 @@ def test_the_truth_of_a_simulation_is_a_reference_if_it_has_heights(height: floa
     assert (name in log.unusable) == (height == 0.0)
     np.testing.assert_allclose(log.tracks[name].attitude, np.tile([0.0, 0.0, 30.0 * DEG], (20, 1)), atol=1e-6)
     np.testing.assert_allclose(log.tracks[name].position[:, 2], height)
+    assert log.references == {name}
     assert "vehicle_attitude_groundtruth[0]" in log.unusable
 
 

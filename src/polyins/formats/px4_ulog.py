@@ -64,6 +64,7 @@ def read(path: str | Path) -> Log:
             unusable,
             utc_of_zero=_utc_of_zero(topics),
             upright=True,
+            references=frozenset(name for name in places if TRUE_PLACE in name),
             fix_age=known["EKF2_GPS_DELAY"] * 1e-3 if "EKF2_GPS_DELAY" in known else None,
             antenna=_antenna(known),
             notes=(
