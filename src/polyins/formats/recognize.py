@@ -222,7 +222,7 @@ def _rows_of_numbers(head: bytes) -> str | None:
         return None if _are_rates(columns[0], columns[4:7]) or _are_rates(columns[0], columns[1:4]) else "kf-gins"
     if count == 13 and _rises(columns[0]):
         return "kf-gins-gnss"
-    if count == 11 and _rises(columns[1]) and columns[0][0] == round(columns[0][0]):
+    if count == 11 and _rises(columns[1]) and columns[0][0] == np.round(columns[0][0]):
         on_earth = np.abs(columns[2]).max() <= 90.0 and np.abs(columns[3]).max() <= 360.0
         return "kf-gins-nav" if on_earth else None
     return None
