@@ -204,3 +204,13 @@ def test_reference_by_the_name_of_a_nav_file(data_folder: Path, tmp_path: Path) 
     assert reference.velocity is not None
     assert reference.attitude is not None
     assert len(reference.time) == 3001
+
+
+def test_lines_that_were_cut_are_left_out_and_named(tmp_path: Path) -> None:
+    rows = as_increments(still_imu())
+    whole = write_rows(tmp_path / "imu.txt", rows).read_text()
+    (tmp_path / "cut.txt").write_text(whole[30:-25])
+    found = kf_gins.read_imu(tmp_path / "cut.txt")
+    np.testing.assert_allclose(found.time, rows[1:-1, 0], atol=1e-9)
+    assert f"lines 1 and {len(rows)} are cut off" in found.warnings[0]
+    assert found.source.place(0).endswith("line 2")

@@ -163,3 +163,14 @@ def test_without_a_header_the_clock_is_said_to_be_unknown(tmp_path: Path) -> Non
     track = read_gnss(path)
     assert track.time[0] == 375062.0
     assert "no header" in track.warnings[0]
+
+
+def test_one_broken_row_among_whole_ones_is_named_and_left_out(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.pos", ["2217 1.0", "2217 2.0", "2217 3.0"])
+    lines = path.read_text().splitlines()
+    lines[-2] = lines[-2].replace("34.", "broken ", 1)
+    path.write_text("\n".join(lines) + "\n")
+    track = read_gnss(path)
+    assert len(track.time) == 2
+    assert f"line {len(lines) - 1}: " in track.warnings[0]
+    assert track.source.place(1).endswith(f"line {len(lines)}")

@@ -344,3 +344,33 @@ def test_quadrotor_reference_attitude_is_in_step_with_the_array(data_folder: Pat
     }
     assert max(agreement, key=agreement.__getitem__) == 0.0
     assert agreement[0.0] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("header", "change", "message"),
+    [
+        ("t,lat,lon,h,sn,se,sd", {3: 1000.0}, r"line \d+: height is 500000 m; expected at most 100000 m: is it in mm"),
+        (
+            "t,lat,lon,h,vn,ve,vd",
+            {4: 1000.0, 5: 1000.0},
+            r"velocities are .* m/s in the middle, the positions change by",
+        ),
+    ],
+)
+def test_positions_in_other_units_are_refused(
+    header: str, change: dict[int, float], message: str, tmp_path: Path
+) -> None:
+    values = write_recording(tmp_path)
+    rows = fixes()
+    rows[:, 1] += 1e-5 * np.arange(len(rows))
+    rows[:, 3] = 500.0
+    rows[:, 4:7] = [1.11, 0.01, 0.01]
+    for column, factor in change.items():
+        rows[:, column] *= factor
+    names = header.split(",")
+    write_rows(tmp_path / "fixes.csv", rows, header, ",")
+    vector = "std" if names[4] == "sn" else "velocity"
+    columns = {"time": {"name": "t"}, "position": {"names": names[1:4]}, vector: {"names": names[4:7]}}
+    values["gnss"] = {"file": "fixes.csv", "columns": columns, "position_std_m": 0.02}
+    with pytest.raises(InputError, match=message):
+        load(write_config(tmp_path, values))

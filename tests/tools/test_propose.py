@@ -146,8 +146,38 @@ def test_logs_on_two_clocks_are_brought_together_by_utc(tmp_path: Path) -> None:
     (tmp_path / "fixes.nmea").write_text("\n".join(lines) + "\n")
     text = propose([tmp_path / "imu.csv", tmp_path / "fixes.nmea"])
     sunday = 1707004800.0  # 4 February 2024
-    assert f"clock_offset_s: {-(sunday - 18.0)}  # CHECK: from the clock of one log to that of the other" in text
+    assert f"clock_offset_s: {-(sunday - 18.0)}  # CHECK: by what both files say of UTC" in text
     (tmp_path / "config.yaml").write_text(text)
     gnss = load(tmp_path / "config.yaml").gnss
     assert gnss is not None
     np.testing.assert_allclose(gnss.time, [100.0, 101.0, 102.0, 103.0], atol=1e-6)
+
+
+def turned_fast(scale_deg_s: float) -> np.ndarray:
+    """Rest, then turns beyond the end of the range: t, gyro deg/s, force g."""
+    time = np.arange(1, 1001) / 50.0
+    rate = np.where(time[:, None] > 8.0, 1.3 * scale_deg_s * np.sin(np.outer(time, [3.0, 2.1, 1.7])), 0.3)
+    noise = np.random.default_rng(2).normal(0.0, 0.1, rate.shape)
+    force = np.tile([0.0, 0.0, -1.0], (len(time), 1))
+    force[time > 8.0] += [1.5, 0.0, 0.2]
+    return np.column_stack([time, np.clip(rate + noise, -scale_deg_s, scale_deg_s), force + 1e-3 * noise])
+
+
+@pytest.mark.parametrize("scale", [500.0, 1997.99])
+def test_the_end_of_the_gyros_range_and_what_is_down_at_rest(scale: float, tmp_path: Path) -> None:
+    path = write_rows(tmp_path / "imu.csv", turned_fast(scale), "t,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g", ",")
+    text = propose([path])
+    assert f"gyro_range_deg_s: {scale:g}" in text
+    assert "axes: [x, y, z]" in text
+
+
+def test_what_info_would_refuse_is_not_proposed(tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from polyins import cli
+
+    write_rows(tmp_path / "imu.csv", still_imu(60), "t,gx,gy,gz,ax,ay,az", ",")
+    done = CliRunner().invoke(cli.cli, ["init", str(tmp_path / "imu.csv"), "--out", str(tmp_path / "made.yaml")])
+    assert isinstance(done.exception, InputError)
+    assert "cannot be navigated with as they are" in str(done.exception)
+    assert not (tmp_path / "made.yaml").exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,14 @@ class TextTable:
             self._parsed = self._parsed if text_is_nan else known
         return [known[place] for place in places]
 
+    def parse_numbers(self) -> None:
+        """Parse all columns that begin with numbers at once, so that each is there when it is asked for."""
+        head = self._content[:HEAD_BYTES].decode(errors="replace").splitlines()[:-1]
+        rows = [fields for line in head if len(fields := split(line, self._dialect.delimiter)) == len(self.names)]
+        numeric = [n for n, cells in enumerate(zip(*rows, strict=True), 1) if _are_numbers(cells)]
+        with suppress(InputError):  # what is wrong is said of the columns that are used
+            self.numbers(numeric)
+
     def texts(self, column: Column) -> NDArray[np.str_]:
         """Return a column as it stands there, shape (T,)."""
         from pyarrow import string
@@ -92,6 +101,9 @@ class ParquetTable:
     def numbers(self, wanted: Sequence[Column], *, text_is_nan: bool = False) -> list[Array]:
         """Return columns, each of shape (T,); raises InputError for one that is missing or is text."""
         return _parquet_columns(self.path, wanted, self._content)
+
+    def parse_numbers(self) -> None:
+        """Do nothing: columns of Parquet are read one by one."""
 
     def texts(self, column: Column) -> NDArray[np.str_]:
         """Return a column as text, shape (T,)."""
@@ -189,6 +201,10 @@ def _tidy(content: bytes, table: Dialect) -> bytes:
     if table.decimal_comma:
         content = content.replace(b",", b".")
     return _one_blank(content) if table.delimiter == " " else content
+
+
+def _are_numbers(cells: Sequence[str]) -> bool:
+    return any(map(is_number, cells)) and all(not text or is_number(text) for text in cells)
 
 
 def _one_blank(content: bytes) -> bytes:

@@ -14,9 +14,9 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, opened, read_bytes, read_head, write_bytes
 from polyins.formats.arrow_arrays import to_numpy
-from polyins.formats.columns import PIECE_ROWS, Column
+from polyins.formats.columns import PIECE_ROWS, Column, whole_rows
 from polyins.formats.columns import read_in_order as read_text_in_order
-from polyins.formats.layout import HEAD_BYTES
+from polyins.formats.layout import HEAD_BYTES, layout
 from polyins.formats.rows import ImuRows, RowSource, Track, intervals
 from polyins.model.geodesy import displacement
 from polyins.model.recording import Array, GnssStream, ImuStream
@@ -47,8 +47,11 @@ def read_imu(path: str | Path) -> ImuRows:
     """
     content = read_bytes(path)
     text = is_text(content)
-    rows = _numbers(path, content, {IMU_COLUMNS: "s, 3 rad, 3 m/s"}) if text else _binary(path, content)
-    return ImuRows(RowSource(str(find(path)), 1 if text else None), rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+    if text:
+        source, rows = _numbers(path, content, {IMU_COLUMNS: "s, 3 rad, 3 m/s"})
+    else:
+        source, rows = RowSource(str(find(path))), _binary(path, content)
+    return ImuRows(source, rows[:, 0], rows[:, 1:4], rows[:, 4:7], warnings=source.warnings)
 
 
 def read_rates(path: str | Path, rate_hz: float | None = None) -> ImuRows:
@@ -101,12 +104,13 @@ def read_gnss(path: str | Path) -> Track:
         7: "s, latitude deg, longitude deg, height m, std m",
         13: "the same with velocity and its std",
     }
-    rows = _numbers(path, read_bytes(path), wanted)
-    source = RowSource(str(find(path)), 1)
+    source, rows = _numbers(path, read_bytes(path), wanted)
     if rows.shape[1] == 7:
-        return Track(source, rows[:, 0], _radians(rows[:, 1:4], 2), position_std=rows[:, 4:7])
+        places = _radians(rows[:, 1:4], 2)
+        return Track(source, rows[:, 0], places, position_std=rows[:, 4:7], warnings=source.warnings)
     velocity, std = slice(4, 7), slice(7, 10)
     matlab = _std_first(source, rows)
+    order = (f"{source.path}: columns 5 to 7 are taken as std and 8 to 10 as velocity",) if matlab else ()
     if matlab:
         velocity, std = std, velocity
     return Track(
@@ -116,7 +120,7 @@ def read_gnss(path: str | Path) -> Track:
         position_std=rows[:, std],
         velocity=rows[:, velocity],
         velocity_std=rows[:, 10:13],
-        warnings=(f"{source.path}: columns 5 to 7 are taken as std and 8 to 10 as velocity",) if matlab else (),
+        warnings=(*source.warnings, *order),
     )
 
 
@@ -141,13 +145,15 @@ def _std_first(source: RowSource, rows: Array) -> bool:
 
 def read_nav(path: str | Path) -> Track:
     """Read a navigation result or truth: week, s, latitude, longitude (deg), height (m), velocity NED, angles (deg)."""
-    rows = _numbers(path, read_bytes(path), {11: "week, s, lat, lon, h, vN, vE, vD, roll, pitch, heading"})
+    wanted = {11: "week, s, lat, lon, h, vN, vE, vD, roll, pitch, heading"}
+    source, rows = _numbers(path, read_bytes(path), wanted)
     return Track(
-        RowSource(str(find(path)), 1),
+        source,
         rows[:, 1],
         _radians(rows[:, 2:5], 2),
         velocity=rows[:, 5:8],
         attitude=rows[:, 8:11] * DEG,
+        warnings=source.warnings,
     )
 
 
@@ -204,8 +210,12 @@ def _binary(path: str | Path, content: bytes) -> Array:
     return np.frombuffer(content, "<f8").reshape(-1, IMU_COLUMNS).astype(float)
 
 
-def _numbers(path: str | Path, content: bytes, wanted: dict[int, str]) -> Array:
-    """Parse rows of numbers between blanks or commas and check how many columns there are."""
+def _numbers(path: str | Path, content: bytes, wanted: dict[int, str]) -> tuple[RowSource, Array]:
+    """Parse rows of numbers between blanks or commas and check how many columns there are.
+
+    A first or last line that was cut off is left out with a warning.
+    """
+    source, content = _whole_lines(path, content)
     if b"," in content[:4096]:
         content = content.replace(b",", b" ")
     rows = _evenly_spaced(content)
@@ -217,7 +227,20 @@ def _numbers(path: str | Path, content: bytes, wanted: dict[int, str]) -> Array:
     if rows.shape[1] not in wanted:
         expected = " or ".join(f"{count} ({names})" for count, names in wanted.items())
         raise InputError(f"{find(path)}: {rows.shape[1]} columns; expected {expected}")
-    return rows
+    return source, rows
+
+
+def _whole_lines(path: str | Path, content: bytes) -> tuple[RowSource, bytes]:
+    """Return where the rows come from, and the text without lines that were cut off."""
+    source = RowSource(str(find(path)), 1)
+    try:
+        table = layout(path, content)
+    except InputError:
+        return source, content
+    whole, warnings = whole_rows(find(path), content, table)
+    if any(table.names) or not warnings:
+        return source, content
+    return RowSource(source.path, table.first_line, warnings=warnings), whole
 
 
 def _evenly_spaced(content: bytes) -> Array | None:

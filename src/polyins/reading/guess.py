@@ -70,6 +70,7 @@ def _only_of_table(path: str | Path) -> tuple[Stream, tuple[str, ...]]:
 def read_table(path: str | Path) -> list[TableStream] | HalfImu:
     """Return the streams of a table; raise InputError if neither names nor values say what its columns are."""
     opened = open_table(path)
+    opened.parse_numbers()
     names = set(opened.names)
     if names.issuperset(table.IMU_NAMES):
         return [TableStream(table.imu_of(opened, table.written_imu_columns()), None, ())]
