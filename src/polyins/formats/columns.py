@@ -22,6 +22,8 @@ from polyins.model.recording import USUAL_OF, Array
 Column = str | int
 """A column's name, or its number counted from 1."""
 
+Text = bytes | memoryview
+"""the rows of a text; a view where nothing has to change, for a copy of a large file takes as long as a check of it"""
 PARQUET_MAGIC = b"PAR1"
 PIECE_ROWS = max(16_384, USUAL_OF + 1)
 """of a Parquet file read in order"""
@@ -74,7 +76,7 @@ class TextTable:
 
     def parse_numbers(self) -> None:
         """Parse all columns that begin with numbers at once, so that each is there when it is asked for."""
-        head = self._content[:HEAD_BYTES].decode(errors="replace").splitlines()[:-1]
+        head = bytes(self._content[:HEAD_BYTES]).decode(errors="replace").splitlines()[:-1]
         rows = [fields for line in head if len(fields := split(line, self._dialect.delimiter)) == len(self.names)]
         numeric = [n for n, cells in enumerate(zip(*rows, strict=True), 1) if _are_numbers(cells)]
         with suppress(InputError):  # what is wrong is said of the columns that are used
@@ -177,7 +179,7 @@ def _whole_lines(path: Path) -> Iterator[bytes]:
             yield rest
 
 
-def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tuple[bytes, tuple[str, ...]]:
+def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tuple[Text, tuple[str, ...]]:
     """Return the lines from the first row on as the parser takes them, and warnings of lines that are cut off.
 
     `ahead`: lines of the file before the content.
@@ -191,7 +193,9 @@ def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tu
         cut.append(ahead + content.count(b"\n", 0, end) + 1)
     named = " and ".join(str(line) for line in cut)
     lines = f"line {named} is" if len(cut) == 1 else f"lines {named} are"
-    return _tidy(content[begin:end], table), (f"{path}: {lines} cut off, and left out",) if cut else ()
+    plain = content.isascii() and not table.decimal_comma and table.delimiter != " "
+    text = memoryview(content)[begin:end] if plain else _tidy(content[begin:end], table)
+    return text, (f"{path}: {lines} cut off, and left out",) if cut else ()
 
 
 def _tidy(content: bytes, table: Dialect) -> bytes:
@@ -236,8 +240,8 @@ def _place(path: Path, names: Sequence[str], column: Column) -> int:
 
 
 def _text_columns(
-    source: RowSource, content: bytes, table: Dialect, places: list[int], text_is_nan: bool
-) -> tuple[RowSource, bytes, list[Array]]:
+    source: RowSource, content: Text, table: Dialect, places: list[int], text_is_nan: bool
+) -> tuple[RowSource, Text, list[Array]]:
     """Return columns of a text that begins with the first row of `source`, and the text without lines that are none."""
     from pyarrow import ArrowInvalid, binary, float64
 
@@ -253,9 +257,9 @@ def _text_columns(
     return source, content, [to_numpy(column) for column in columns]
 
 
-def _without_words(source: RowSource, content: bytes, table: Dialect) -> tuple[RowSource, bytes]:
+def _without_words(source: RowSource, content: Text, table: Dialect) -> tuple[RowSource, Text]:
     """Leave out the lines that hold no number: messages, and a header that is there again."""
-    lines = content.splitlines(keepends=True)
+    lines = bytes(content).splitlines(keepends=True)
     cells = [split(line.decode(errors="replace"), table.delimiter) for line in lines]
     kept = [n for n, fields in enumerate(cells) if any(map(is_number, fields)) or not any(fields)]
     kept = [n for n in kept if len(cells[n]) == table.width or not is_message(cells[n])]
@@ -266,7 +270,7 @@ def _without_words(source: RowSource, content: bytes, table: Dialect) -> tuple[R
 
 
 def _parse(
-    source: RowSource, content: bytes, table: Dialect, places: list[int], kind: Any, empty: Sequence[str] | None = None
+    source: RowSource, content: Text, table: Dialect, places: list[int], kind: Any, empty: Sequence[str] | None = None
 ) -> tuple[RowSource, list[Any]]:
     """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them.
 

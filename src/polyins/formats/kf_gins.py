@@ -240,7 +240,7 @@ def _whole_lines(path: str | Path, content: bytes) -> tuple[RowSource, bytes]:
     whole, warnings = whole_rows(find(path), content, table)
     if any(table.names) or not warnings:
         return source, content
-    return RowSource(source.path, table.first_line, warnings=warnings), whole
+    return RowSource(source.path, table.first_line, warnings=warnings), bytes(whole)
 
 
 def _evenly_spaced(content: bytes) -> Array | None:

@@ -234,17 +234,21 @@ def _numbers(cells: list[str]) -> list[float]:
 
 def _are_places(time: Array, latitude: Array, std: Array) -> bool:
     """Whether columns can be a latitude, deg, and standard deviations: nothing moves that fast, no std is negative."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         speed = np.abs(np.diff(latitude)) / np.abs(np.diff(time))
-    fast = len(speed) > 0 and float(np.nanmedian(speed)) > FASTEST_DEG_S
-    return not fast and float(np.mean(std >= 0.0)) > 0.5
+    return _median(speed) <= FASTEST_DEG_S and float(np.mean(std >= 0.0)) > 0.5
+
+
+def _median(values: Array) -> float:
+    """Return the median of what is finite, 0 of nothing."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else 0.0
 
 
 def _are_rates(time: Array, force: Array) -> bool:
     """Whether three columns are a specific force in m/s^2 or g rather than its increments."""
-    size = float(np.nanmedian(np.linalg.norm(force, axis=0)))
-    steps = np.abs(np.diff(time))
-    step = float(np.nanmedian(steps)) if len(steps) else 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        size, step = _median(np.linalg.norm(force, axis=0)), _median(np.abs(np.diff(time)))
     increments = step > 0.0 and 5.0 < size / step < 15.0
     return not increments and (8.5 < size < 11.2 or 0.85 < size < 1.15)
 
