@@ -15,8 +15,9 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.bundle import LISTING, Bundle, is_bundle
-from polyins.formats.log import Clock, Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Clock, Log
+from polyins.formats.rows import ImuRows, RowSource, Track, rising
 from polyins.formats.text_rows import TextRows, read_rows
 from polyins.model.axes import Axes, axes_matrix, right_handed_axes
 from polyins.model.recording import Array

@@ -14,8 +14,9 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.gps_time import WEEK_S, utc_of_week
-from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log
+from polyins.formats.rows import ImuRows, RowSource, Track, rising
 from polyins.formats.text_rows import TextRows, header_line, lines_before, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG, STANDARD_GRAVITY

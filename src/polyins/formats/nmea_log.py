@@ -19,8 +19,9 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
-from polyins.formats.log import Log, counted, damage_named, rising
-from polyins.formats.rows import RowSource, SensorRows, Track
+from polyins.formats.library import damage_named
+from polyins.formats.log import Log, counted
+from polyins.formats.rows import RowSource, SensorRows, Track, rising
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 

@@ -18,7 +18,8 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats import ros_fields
-from polyins.formats.log import Clock, Log, damage_named, needed
+from polyins.formats.library import damage_named, needed
+from polyins.formats.log import Clock, Log
 from polyins.formats.ros_streams import (
     FIX,
     IMU,

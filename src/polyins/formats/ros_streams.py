@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from polyins.formats import ros_fields
-from polyins.formats.log import counted, joined_rates, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import joined_rates, rates_to_rows
+from polyins.formats.log import counted
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 

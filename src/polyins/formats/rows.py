@@ -153,3 +153,9 @@ def intervals(time: Array) -> Array:
     known = steps[:USUAL_OF][steps[:USUAL_OF] > 0.0]
     usual = float(np.median(known)) if len(known) else 0.0
     return np.concatenate([[usual], np.where((steps > 0.0) & (steps <= GAP * usual), steps, usual)])
+
+
+def rising(time: Array) -> NDArray[np.intp]:
+    """Return the rows whose stamp is above all before it, shape (K,)."""
+    before = np.concatenate([[-np.inf], np.maximum.accumulate(time)[:-1]])
+    return np.flatnonzero(time > before)

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.bundle import LISTING, Bundle, is_bundle
-from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
 from polyins.formats.text_rows import TextRows, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG

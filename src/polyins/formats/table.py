@@ -15,12 +15,11 @@ from polyins.errors import InputError
 from polyins.files import find, plain_suffix, write_bytes
 from polyins.formats.arrow_arrays import to_arrow
 from polyins.formats.columns import Column, OpenTable, column_names, is_parquet, open_table, read_columns
-from polyins.formats.log import rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, intervals
+from polyins.formats.joined import at_stamps
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, intervals, rising
 from polyins.formats.stamps import seconds_per_count, stamps
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG, STANDARD_GRAVITY
-from polyins.prepare.timesync import GAP
 
 if TYPE_CHECKING:
     from polyins.config import AccelColumns, GyroColumns, ImuColumns, RowsOf, TimeColumn, TrackColumns
@@ -103,18 +102,14 @@ def _merged(table: OpenTable, columns: ImuColumns, time: TimeColumn) -> ImuRows:
         raise InputError(
             f"{other.path}: {len(known)} row(s) of the accelerometer, {len(at)} of the gyro; expected more"
         )
-    near = np.searchsorted(known, at)
-    longest = GAP * float(np.median(np.diff(known)))
-    inside = (near > 0) & (near < len(known))
-    inside[inside] = (known[near[inside]] - known[near[inside] - 1]) <= longest
+    force, inside = at_stamps(known, force, at)
     if not inside.any():
         raise InputError(
             f"{other.path}: the accelerometer covers {known[0]:.3f} to {known[-1]:.3f} s, the gyro {at[0]:.3f} to "
             f"{at[-1]:.3f} s; expected the same clock"
         )
-    force = np.column_stack([np.interp(at[inside], known, axis) for axis in force.T])
     kept = np.flatnonzero(inside)
-    values = [*rates[kept].T, *force.T]
+    values = [*rates[kept].T, *force[kept].T]
     plain = columns.model_copy(update={"gyro": _unscaled(columns.gyro), "accel": _unscaled(accel)})
     rows = _imu_rows(source.at(kept), values, plain, at[kept])
     return replace(rows, warnings=tuple(dict.fromkeys((*rows.warnings, *other.source.warnings))))

@@ -18,8 +18,9 @@ import numpy as np
 from polyins.files import find, read_bytes
 from polyins.formats import nmea_log, ublox_sensors
 from polyins.formats.gps_time import GPS_EPOCH, WEEK_S, utc_of_week
-from polyins.formats.log import Log, counted, damage_named, needed, rising
-from polyins.formats.rows import RowSource, SensorRows, Track
+from polyins.formats.library import damage_named, needed
+from polyins.formats.log import Log, counted
+from polyins.formats.rows import RowSource, SensorRows, Track, rising
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
