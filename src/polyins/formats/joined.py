@@ -39,5 +39,5 @@ def at_stamps(time: Array, values: Array, stamps: Array) -> tuple[Array, NDArray
     found = np.column_stack([np.interp(stamps, time, axis) for axis in values.T])
     after = np.clip(np.searchsorted(time, stamps), 1, len(time) - 1)
     step = usual_interval(time)
-    near = np.diff(time)[after - 1] <= GAP * step
+    near = (np.diff(time)[after - 1] <= GAP * step) | np.isin(stamps, time)
     return found, near & (stamps >= time[0] - step) & (stamps <= time[-1] + step)
