@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from polyins.files import find
-from polyins.formats.gps_time import utc_of_week
 from polyins.formats.joined import rates_to_rows
 from polyins.formats.library import damage_named, heard, needed
 from polyins.formats.log import Log, counted, fastest
 from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
+from polyins.model.gps_time import utc_of_week
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from polyins.files import find, read_bytes
 from polyins.formats import nmea_log, ublox_sensors
-from polyins.formats.gps_time import GPS_EPOCH, WEEK_S, utc_of_week
 from polyins.formats.library import damage_named, needed
 from polyins.formats.log import Log, counted
 from polyins.formats.rows import RowSource, SensorRows, Track, rising
+from polyins.model.gps_time import GPS_EPOCH, WEEK_S, utc_of_week
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -57,6 +57,11 @@ _TIME_AT = {
 }  # fmt: skip
 """where iTOW stands in the messages that are looked at"""
 _SENSED = {(0x10, 0x02): "ESF-MEAS", (0x10, 0x03): "ESF-RAW", (0x10, 0x15): "ESF-INS"}
+
+
+def fits(head: bytes) -> bool:
+    """Whether there is a whole message, by its checksum."""
+    return next(_frames(head), None) is not None
 
 
 def read(path: str | Path) -> Log:

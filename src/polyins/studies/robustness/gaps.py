@@ -52,7 +52,7 @@ WAYS = ("batch", "live", "resumed")
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class GapVehicle:
     """What has the gap."""
 
     name: str
@@ -62,13 +62,13 @@ class Vehicle:
 
 
 VEHICLES = (
-    Vehicle("array", "fixes", "enav-fusion", True),
-    Vehicle("wheels with GNSS", "wheels", "triple-ins", True),
-    Vehicle("wheels", "wheels", "triple-ins", False),
+    GapVehicle("array", "fixes", "enav-fusion", True),
+    GapVehicle("wheels with GNSS", "wheels", "triple-ins", True),
+    GapVehicle("wheels", "wheels", "triple-ins", False),
 )
 
 
-class Track(NamedTuple):
+class StatedErrors(NamedTuple):
     """Errors of a solution, and what it said they might be."""
 
     time: Array
@@ -90,10 +90,10 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
 
 
 def _rows(
-    vehicle: Vehicle, length: float, seeds: tuple[int, ...], progress: Callable[[float], None]
+    vehicle: GapVehicle, length: float, seeds: tuple[int, ...], progress: Callable[[float], None]
 ) -> dict[str, dict[str, Any]]:
     """Return the figures of each way, over all seeds."""
-    found: dict[str, list[tuple[Track, int | None]]] = {way: [] for way in WAYS}
+    found: dict[str, list[tuple[StatedErrors, int | None]]] = {way: [] for way in WAYS}
     for seed in seeds:
         whole, end = simulate(scenario(vehicle, length), seed=seed), AT + length
         usual = track(batch.run(whole, vehicle.method), whole)
@@ -108,7 +108,7 @@ def _rows(
     return {way: _figures(tracks) for way, tracks in found.items()}
 
 
-def _fixes_until_back(errors: Track, recording: Recording, end: float, limit: float) -> int | None:
+def _fixes_until_back(errors: StatedErrors, recording: Recording, end: float, limit: float) -> int | None:
     """Return after how many fixes from the end of a gap on the error is below a limit, m; None without fixes."""
     if recording.gnss is None:
         return None
@@ -120,7 +120,7 @@ def _fixes_until_back(errors: Track, recording: Recording, end: float, limit: fl
     return int(np.argmax(back)) + 1 if back.any() else len(fixes)
 
 
-def _figures(tracks: list[tuple[Track, int | None]]) -> dict[str, Any]:
+def _figures(tracks: list[tuple[StatedErrors, int | None]]) -> dict[str, Any]:
     over, back = np.concatenate([track.over for track, _ in tracks]), [one for _, one in tracks]
     return {
         "inside_percent": 100.0 * float(np.mean(over < INSIDE)),
@@ -129,7 +129,7 @@ def _figures(tracks: list[tuple[Track, int | None]]) -> dict[str, Any]:
     }
 
 
-def scenario(vehicle: Vehicle, length: float) -> Scenario:
+def scenario(vehicle: GapVehicle, length: float) -> Scenario:
     """Return a drive that is long enough for a gap, s."""
     known, seconds = SCENARIOS[vehicle.scenario], AT + length + AFTER
     if known.laps is None:
@@ -189,7 +189,7 @@ def _fed(navigator: Navigator, samples: list[Sample], recording: Recording) -> l
     return states
 
 
-def track(solution: Solution, recording: Recording) -> Track:
+def track(solution: Solution, recording: Recording) -> StatedErrors:
     """Return the errors of a solution."""
     assert recording.reference is not None
     errors = compare_to_reference(solution, recording.reference)
@@ -198,7 +198,7 @@ def track(solution: Solution, recording: Recording) -> Track:
     variance = euler_variance(euler_angles(solution.attitude[rows]), solution.phi_covariance[rows])
     position = errors.horizontal / np.sqrt(solution.position_variance[rows, :2].sum(axis=1))
     heading = np.abs(errors.attitude[:, 2]) / np.sqrt(variance[:, 2])
-    return Track(errors.time, errors.horizontal, np.maximum(position, heading))
+    return StatedErrors(errors.time, errors.horizontal, np.maximum(position, heading))
 
 
 def print_tables(figures: Mapping[str, Any]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from polyins.formats.rows import SensorRows
 from polyins.tools.propose.lines import Line
 from polyins.tools.propose.places import place_lines
-from polyins.tools.propose.sources import Source
+from polyins.tools.propose.sources import FoundStream
 
 HEADING_STD_DEG = 5.0
 """of the heading of another system, and of an offset of it: a compass on a vehicle"""
@@ -15,7 +15,7 @@ BAROMETER_RATE_HZ = HEADING_RATE_HZ = 1.0
 """errors of another filter last; taken at its own rate they would be averaged away"""
 
 
-def odometer_lines(of: Source, first: Source) -> list[Line]:
+def odometer_lines(of: FoundStream, first: FoundStream) -> list[Line]:
     """Return the section `odometer`."""
     return [
         *place_lines(of, first),
@@ -25,7 +25,7 @@ def odometer_lines(of: Source, first: Source) -> list[Line]:
     ]
 
 
-def barometer_lines(of: Source, first: Source) -> list[Line]:
+def barometer_lines(of: FoundStream, first: FoundStream) -> list[Line]:
     """Return the section `height`."""
     off = "by which the weather is off the standard atmosphere, and the sea"
     return [
@@ -38,7 +38,7 @@ def barometer_lines(of: Source, first: Source) -> list[Line]:
     ]
 
 
-def heading_lines(of: Source, first: Source) -> list[Line]:
+def heading_lines(of: FoundStream, first: FoundStream) -> list[Line]:
     """Return the section `heading`."""
     told = isinstance(of.rows, SensorRows) and of.rows.std is not None
     how = "or leave it out, to take what the log tells" if told else "the log does not tell how good this heading is"

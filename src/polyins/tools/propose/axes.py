@@ -11,7 +11,7 @@ from polyins.formats.log import Log
 from polyins.formats.rows import ImuRows, SensorRows, intervals
 from polyins.model.axes import axes_matrix, composed, right_handed_axes
 from polyins.tools.propose.lines import TURNED, Line
-from polyins.tools.propose.sources import Source
+from polyins.tools.propose.sources import FoundStream
 
 SENSOR_AXES: Axes = ("x", "y", "z")
 STILL_RAD_S = 0.1
@@ -29,7 +29,7 @@ FEWEST_MEANS = 20
 MOUNT = Line("    mount_deg: [0, 0, 0]", "roll, pitch, yaw that the axes are off by, deg")
 
 
-def axes_lines(imu: Source, facts: dict[str, Any], speed: Source | None) -> list[Line]:
+def axes_lines(imu: FoundStream, facts: dict[str, Any], speed: FoundStream | None) -> list[Line]:
     """Return which axes point forward, right, down: by the format, by gravity, or by what a speed changes."""
     if imu.log is not None and imu.log.upright:
         own = imu.log.axes.get(imu.stream, SENSOR_AXES)

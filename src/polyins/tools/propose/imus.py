@@ -12,7 +12,7 @@ from polyins.tools.inspect import describe
 from polyins.tools.propose.axes import axes_lines
 from polyins.tools.propose.lines import Line, quoted
 from polyins.tools.propose.places import BY_UTC, TO_ONE_CLOCK, format_lines, point_line
-from polyins.tools.propose.sources import Roles, Source
+from polyins.tools.propose.sources import FoundStream, Roles
 
 GRADE = "consumer-mems"
 FULL_SCALES_DEG_S = (125.0, 250.0, 300.0, 400.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0)
@@ -23,7 +23,7 @@ FEWEST_SHAKEN = 100
 MEDIAN_TO_STD = 1.4826
 
 
-def imu_lines(number: int, imu: Source, of: Roles) -> list[Line]:
+def imu_lines(number: int, imu: FoundStream, of: Roles) -> list[Line]:
     """Return the entry of an IMU in the list of them."""
     assert isinstance(imu.rows, ImuRows)
     facts = describe(imu.rows)

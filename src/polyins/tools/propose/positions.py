@@ -7,10 +7,10 @@ from polyins.formats.rows import Track
 from polyins.tools.inspect import describe
 from polyins.tools.propose.lines import Line, flow, quoted
 from polyins.tools.propose.places import BY_UTC, TO_ONE_CLOCK, format_lines, point_line
-from polyins.tools.propose.sources import Roles, Source
+from polyins.tools.propose.sources import FoundStream, Roles
 
 
-def track_lines(section: str, of: Source, imus: Roles) -> list[Line]:
+def track_lines(section: str, of: FoundStream, imus: Roles) -> list[Line]:
     """Return the section `gnss` or `reference`."""
     track = of.rows
     assert isinstance(track, Track)
@@ -32,7 +32,7 @@ def track_lines(section: str, of: Source, imus: Roles) -> list[Line]:
     return [*lines, *_height_lines(of, track)]
 
 
-def _height_lines(of: Source, track: Track) -> list[Line]:
+def _height_lines(of: FoundStream, track: Track) -> list[Line]:
     doubts = [doubt.text for doubt in of.table.doubts if doubt.about == "heights"] if of.table else []
     lines = [
         Line("  height: as-given", f"{text}; sea-level with geoid_height_m, or ellipsoidal, say which")
@@ -54,7 +54,7 @@ def _above_sea() -> Line:
     )
 
 
-def _clock_line(of: Source, imus: Roles) -> Line:
+def _clock_line(of: FoundStream, imus: Roles) -> Line:
     time, shift = of.rows.time, of.shift_to(imus.imus[0])
     if shift:
         age = of.log.fix_age or 0.0 if of.log else 0.0

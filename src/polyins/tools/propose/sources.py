@@ -19,7 +19,7 @@ from polyins.reading.table_stream import TableStream
 
 
 @dataclass(frozen=True)
-class Source:
+class FoundStream:
     """One stream, and where it is."""
 
     path: str | Path
@@ -42,7 +42,7 @@ class Source:
         """Its file, and its name in it."""
         return f"{self.path}, {self.stream}" if self.stream else str(self.path)
 
-    def shift_to(self, first: Source) -> float | None:
+    def shift_to(self, first: FoundStream) -> float | None:
         """Return what brings its stamps to the clock of the first IMU, s, or None where files do not tell."""
         if self.log is first.log and self.log is not None:
             return 0.0
@@ -67,9 +67,9 @@ class Source:
         return isinstance(self.rows, Track) and self.rows.attitude is not None
 
 
-def read_sources(paths: Sequence[str | Path]) -> tuple[list[Source], list[str]]:
+def read_sources(paths: Sequence[str | Path]) -> tuple[list[FoundStream], list[str]]:
     """Return the streams that can be used, and why others are not; raises InputError if no file is readable."""
-    found: list[Source] = []
+    found: list[FoundStream] = []
     halves: list[HalfImu] = []
     left_out: list[str] = []
     refused: list[InputError] = []
@@ -78,7 +78,9 @@ def read_sources(paths: Sequence[str | Path]) -> tuple[list[Source], list[str]]:
             if log_format(path) is not None:
                 log = read_log(path)
                 found += [
-                    Source(path, rows, (), name, log) for name, rows in log.streams.items() if name not in log.unusable
+                    FoundStream(path, rows, (), name, log)
+                    for name, rows in log.streams.items()
+                    if name not in log.unusable
                 ]
                 left_out += [f"{path}: {name} is not used: {why}" for name, why in log.unusable.items()]
                 left_out += [f"{path}: {note}" for note in log.notes]
@@ -87,9 +89,9 @@ def read_sources(paths: Sequence[str | Path]) -> tuple[list[Source], list[str]]:
                 if isinstance(streams, HalfImu):
                     halves.append(streams)
                 else:
-                    found += [Source(path, one.rows, one.guesses, table=one) for one in streams]
+                    found += [FoundStream(path, one.rows, one.guesses, table=one) for one in streams]
             else:
-                found.append(Source(path, *read_stream(path)))
+                found.append(FoundStream(path, *read_stream(path)))
         except InputError as error:
             refused.append(error)
     found += _paired(halves, left_out)
@@ -98,13 +100,13 @@ def read_sources(paths: Sequence[str | Path]) -> tuple[list[Source], list[str]]:
     return found, [*left_out, *(f"not used: {error}" for error in refused)]
 
 
-def _paired(halves: Sequence[HalfImu], left_out: list[str]) -> list[Source]:
+def _paired(halves: Sequence[HalfImu], left_out: list[str]) -> list[FoundStream]:
     """Return the IMUs of files of a gyro and files of an accelerometer, in their order."""
     gyros, accels = ([half for half in halves if half.what == what] for what in ("gyro", "accel"))
     found = []
     for gyro, accel in zip(gyros, accels, strict=False):
         one = described(open_table(gyro.source.path), joined_columns(gyro, accel), [])
-        found.append(Source(gyro.source.path, one.rows, one.guesses, table=one))
+        found.append(FoundStream(gyro.source.path, one.rows, one.guesses, table=one))
     for half in (*gyros[len(accels) :], *accels[len(gyros) :]):
         left_out.append(f"{half.source.path}: holds the {half.what} of an IMU alone, and is not used")
     return found
@@ -114,13 +116,13 @@ def _paired(halves: Sequence[HalfImu], left_out: list[str]) -> list[Source]:
 class Roles:
     """Which of the sources is what; there is at least one IMU."""
 
-    imus: Sequence[Source]
-    gnss: Source | None = None
-    reference: Source | None = None
-    heading: Source | None = None
-    odometer: Source | None = None
-    height: Source | None = None
-    unused: tuple[Source, ...] = ()
+    imus: Sequence[FoundStream]
+    gnss: FoundStream | None = None
+    reference: FoundStream | None = None
+    heading: FoundStream | None = None
+    odometer: FoundStream | None = None
+    height: FoundStream | None = None
+    unused: tuple[FoundStream, ...] = ()
     """more positions"""
 
     @property
@@ -130,12 +132,12 @@ class Roles:
         return max(time[0] for time in times), min(time[-1] for time in times)
 
     @property
-    def tracks(self) -> list[Source]:
+    def tracks(self) -> list[FoundStream]:
         """All positions."""
         return [one for one in (self.gnss, self.reference, *self.unused) if one is not None]
 
 
-def roles(read: Sequence[Source]) -> Roles:
+def roles(read: Sequence[FoundStream]) -> Roles:
     """Return what is what: the first sensor of each kind, a receiver, and a reference.
 
     Another system's solution comes last, one with attitude is a reference rather than a receiver's, if there is a

@@ -7,7 +7,7 @@ import numpy as np
 from polyins.formats.rows import Track
 from polyins.model.rig import DEG
 from polyins.tools.propose.lines import Line, flow
-from polyins.tools.propose.sources import Roles, Source
+from polyins.tools.propose.sources import FoundStream, Roles
 
 STANDING_M_S = 0.1
 """less than that a reference says of what stands"""
@@ -35,7 +35,7 @@ def _heading_line(of: Roles) -> Line:
     return Line("  heading_deg: 0.0", "clockwise from north; no file tells it")
 
 
-def _given_start(of: Source, span: tuple[float, float]) -> list[Line]:
+def _given_start(of: FoundStream, span: tuple[float, float]) -> list[Line]:
     """Return the state that a log's reference has when the IMUs begin: without other aids nothing tells it better."""
     track = of.rows
     assert isinstance(track, Track)
