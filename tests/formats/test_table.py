@@ -16,7 +16,8 @@ from written_recordings import still_imu, write_rows
 from polyins.config import ImuColumns, TrackColumns
 from polyins.errors import InputError
 from polyins.formats.columns import column_names, read_columns
-from polyins.formats.table import read_imu, read_track, write_gnss, write_imu
+from polyins.formats.table import read_imu, read_track
+from polyins.formats.written_table import write_gnss, write_imu
 from polyins.model.recording import GnssStream, ImuStream
 from polyins.model.rig import DEG
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats import kf_gins, rtklib, table, xsens_dot
+from polyins.formats import kf_gins, rtklib, table, written_table, xsens_dot
 from polyins.formats.columns import open_table
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, Track
@@ -73,9 +73,9 @@ def read_table(path: str | Path) -> list[TableStream] | HalfImu:
     opened = open_table(path)
     opened.parse_numbers()
     names = set(opened.names)
-    if names.issuperset(table.IMU_NAMES):
-        return [TableStream(table.imu_of(opened, table.written_imu_columns()))]
-    if table.is_written_track(names):
+    if names.issuperset(written_table.IMU_NAMES):
+        return [TableStream(table.imu_of(opened, written_table.written_imu_columns()))]
+    if written_table.is_written_track(names):
         return [TableStream(table.read_track(path))]
     if not any(names):
         return unnamed_columns.streams_of(opened)

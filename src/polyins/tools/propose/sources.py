@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from polyins.errors import InputError
-from polyins.formats import rtklib, table
+from polyins.formats import rtklib, written_table
 from polyins.formats.columns import open_table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
@@ -24,7 +24,6 @@ class FoundStream:
 
     path: str | Path
     rows: ImuRows | Track | SensorRows
-    notes: tuple[str, ...] = ()
     stream: str = ""
     """its name, in a log"""
     log: Log | None = None
@@ -34,7 +33,7 @@ class FoundStream:
     def utc_of_zero(self) -> float | None:
         """Unix time at which its stamps are zero, s, where its file tells it; a log gets fixes when they are old."""
         if self.log is None:
-            return rtklib.utc_of_zero(self.path) or table.utc_of_zero(self.path)
+            return rtklib.utc_of_zero(self.path) or written_table.utc_of_zero(self.path)
         return None if self.log.utc_of_zero is None else self.log.utc_of_zero + (self.log.fix_age or 0.0)
 
     @property
@@ -78,9 +77,7 @@ def read_sources(paths: Sequence[str | Path]) -> tuple[list[FoundStream], list[s
             if log_format(path) is not None:
                 log = read_log(path)
                 found += [
-                    FoundStream(path, rows, (), name, log)
-                    for name, rows in log.streams.items()
-                    if name not in log.unusable
+                    FoundStream(path, rows, name, log) for name, rows in log.streams.items() if name not in log.unusable
                 ]
                 left_out += [f"{path}: {name} is not used: {why}" for name, why in log.unusable.items()]
                 left_out += [f"{path}: {note}" for note in log.notes]
@@ -89,9 +86,9 @@ def read_sources(paths: Sequence[str | Path]) -> tuple[list[FoundStream], list[s
                 if isinstance(streams, HalfImu):
                     halves.append(streams)
                 else:
-                    found += [FoundStream(path, one.rows, one.guesses, table=one) for one in streams]
+                    found += [FoundStream(path, one.rows, table=one) for one in streams]
             else:
-                found.append(FoundStream(path, *read_stream(path)))
+                found.append(FoundStream(path, read_stream(path)[0]))
         except InputError as error:
             refused.append(error)
     found += _paired(halves, left_out)
@@ -106,7 +103,7 @@ def _paired(halves: Sequence[HalfImu], left_out: list[str]) -> list[FoundStream]
     found = []
     for gyro, accel in zip(gyros, accels, strict=False):
         one = described(open_table(gyro.source.path), joined_columns(gyro, accel), [])
-        found.append(FoundStream(gyro.source.path, one.rows, one.guesses, table=one))
+        found.append(FoundStream(gyro.source.path, one.rows, table=one))
     for half in (*gyros[len(accels) :], *accels[len(gyros) :]):
         left_out.append(f"{half.source.path}: holds the {half.what} of an IMU alone, and is not used")
     return found
