@@ -111,8 +111,7 @@ def _tracks(path: Path, tables: dict[str, Table]) -> dict[str, Track]:
 def _track(path: Path, name: str, fixes: Table, accuracies: Table | None) -> Track:
     """Return the fixes in three dimensions, with the accuracies that were logged with them."""
     time, course = fixes["TimeUS"] * 1e-6, fixes["GCrs"] * DEG
-    fixed = np.flatnonzero(fixes["Status"] >= THREE_DIMENSIONS)
-    kept = fixed[rising(time[fixed])]
+    kept = rising(time, fixes["Status"] >= THREE_DIMENSIONS)
     velocity = np.column_stack([fixes["Spd"] * np.cos(course), fixes["Spd"] * np.sin(course), fixes["VZ"]])
     std, velocity_std = _accuracies(fixes["TimeUS"], accuracies)
     if std is not None:

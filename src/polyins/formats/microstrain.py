@@ -77,8 +77,7 @@ def _track(path: Path, rows: TextRows) -> Track | None:
     rows = rows.whole(*PLACE)
     known = (rows.of(*PLACE[:2]) != 0.0).any(axis=1)
     time = unwrapped(rows.columns["GPS TOW"], WEEK_S)
-    good = np.flatnonzero(known)
-    kept = good[rising(time[good])]
+    kept = rising(time, known)
     if not len(kept):
         return None
     std = rows.of(ACCURACY[0], *ACCURACY)[kept] if rows.has(*ACCURACY) else np.zeros((len(kept), 3))

@@ -243,8 +243,7 @@ def _headings(path: Path, stated: _Stated, time: Array) -> dict[str, SensorRows]
 def _track(path: Path, kind: str, stated: _Stated, time: Array) -> Track:
     at, latitude, longitude, height, separation, quality = np.array(stated.stamped[kind]).T
     stamps = time[at.astype(int)]
-    fixed = np.flatnonzero(np.isin(quality, MEASURED) & np.isfinite(height))
-    kept = fixed[rising(stamps[fixed])]
+    kept = rising(stamps, np.isin(quality, MEASURED) & np.isfinite(height))
     above_sea = bool(np.isnan(separation[kept]).any())
     std, warnings = _std(stated, stamps[kept], time)
     return Track(

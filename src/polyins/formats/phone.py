@@ -197,8 +197,7 @@ def _location(
     given = [rows.columns[name] for name in accuracy if name in rows.columns]
     std = np.column_stack([given[0], given[0], given[1]]) if len(given) > 1 else np.full((len(time), 3), np.nan)
     told = (std > 0.0).all(axis=1)
-    good = np.flatnonzero(told if told.any() else np.ones(len(time), dtype=bool))
-    kept = good[rising(time[good])]
+    kept = rising(time, told if told.any() else np.ones(len(time), dtype=bool))
     return Track(
         RowSource(f"{path}, Location"),
         time[kept],

@@ -124,8 +124,7 @@ def _track(path: Path, name: str, topic: Topic) -> Track:
     units = [DEG, DEG, 1.0] if whole else [1e-7 * DEG, 1e-7 * DEG, 1e-3]
     position = np.column_stack([topic[one] for one in names]) * units
     time = topic["timestamp"] * 1e-6
-    fixed = np.flatnonzero(topic["fix_type"] >= THREE_DIMENSIONS)
-    kept = fixed[rising(time[fixed])]
+    kept = rising(time, topic["fix_type"] >= THREE_DIMENSIONS)
     std = np.column_stack([topic["eph"], topic["eph"], topic["epv"]]).astype(float)
     velocity = np.column_stack([topic[f"vel_{axis}_m_s"] for axis in "ned"]).astype(float)
     velocity_std = np.repeat(topic["s_variance_m_s"][:, None].astype(float), 3, axis=1)

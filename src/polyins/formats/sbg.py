@@ -112,8 +112,7 @@ def _track(path: Path, name: str, rows: TextRows, speeds: TextRows | None) -> Tr
     rows = rows.whole("timestamp", *PLACE)
     time, std = rows.columns["timestamp"], _all(rows, PLACE_STD)
     known = (rows.of(*PLACE[:2]) != 0.0).any(axis=1) & (std > 0.0).all(axis=1)
-    good = np.flatnonzero(known)
-    kept = good[rising(time[good])]
+    kept = rising(time, known)
     if not len(kept):
         return None
     place, above = rows.of(*PLACE)[kept], _all(rows, ("undulation",))[kept, 0]

@@ -155,8 +155,7 @@ def _track(source: RowSource, messages: Messages, time: Array, fixed_name: str) 
     rapid = hasattr(messages[0], "gpsFix")
     kinds, good = _of(messages, "gpsFix" if rapid else "fixType", fixed_name).T
     carrier = np.zeros(len(kinds)) if rapid else _of(messages, "carrSoln")[:, 0]
-    fixed = np.flatnonzero(np.isin(kinds, THREE_DIMENSIONS) & (good == 1.0))
-    kept = fixed[rising(time[fixed])]
+    kept = rising(time, np.isin(kinds, THREE_DIMENSIONS) & (good == 1.0))
     horizontal, vertical, speed = _of(messages, "hAcc", "vAcc", "sAcc")[kept].T * 1e-3
     names = [
         CARRIER.get(int(phase), FIXES.get(int(kind), f"type {kind:g}"))
@@ -206,8 +205,7 @@ def _headings(path: Path, messages: dict[str, list[Any]], times: dict[str, list[
         good = (std > 0.0) & (std < LARGEST_HEADING_STD)
         if valid_name:
             good &= _of(messages[kind], valid_name)[:, 0] == 1.0
-        kept = np.flatnonzero(good)
-        kept = kept[rising(time[kept])]
+        kept = rising(time, good)
         if len(kept):
             source = RowSource(f"{path}, {kind}")
             found[kind] = SensorRows(source, "heading", time[kept], heading[kept], std[kept])

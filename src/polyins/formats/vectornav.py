@@ -120,8 +120,7 @@ def _track(path: Path, name: str, rows: TextRows, ages: list[str]) -> Track | No
         quality = counted(kind[np.isfinite(kind)], lambda fix: FIXES.get(int(fix), f"type {fix:g}"))
     else:
         quality = {}
-    good = np.flatnonzero(known)
-    kept = good[rising(time[good])]
+    kept = rising(time, known)
     velocity = _known(rows, kept, [f"{name}::VelNed::{axis}" for axis in "NED"])
     speed = _known(rows, kept, 3 * [f"{name}::VelU"], positive=True)
     return Track(
