@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from written_recordings import as_increments, still_imu
 
-from polyins.checks.stream_checks import check_imu, off_upright, upright_axes
+from polyins.checks.stream_checks import check_imu, check_track, off_upright, upright_axes
 from polyins.errors import InputError
-from polyins.formats.rows import ImuRows, RowSource
+from polyins.formats.rows import ImuRows, RowSource, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
 
 UP = np.array([0.3, -0.5, -9.8])
@@ -76,3 +76,13 @@ def test_a_wheel_may_turn_faster() -> None:
 
 def test_warnings_of_the_reader_are_passed_on() -> None:
     assert check_imu(replace(rows(as_increments(still_imu())), warnings=("a zero row",))) == ("a zero row",)
+
+
+def test_one_height_above_the_air_is_for_the_gate_and_all_are_another_unit() -> None:
+    time = np.arange(20.0)
+    place = np.tile([0.8, 0.2, 500.0], (20, 1))
+    place[7, 2] = 1e6
+    assert check_track(Track(RowSource("fixes.csv"), time, place, geodetic=True), "gnss") == ()
+    place[:, 2] = 5e5
+    with pytest.raises(InputError, match="in mm"):
+        check_track(Track(RowSource("fixes.csv"), time, place, geodetic=True), "gnss")

@@ -78,6 +78,14 @@ def test_a_change_of_a_file_in_a_folder_is_seen(tmp_path: Path) -> None:
     assert state(folder) != before
 
 
+@pytest.mark.parametrize("name", ["Gyroscope.csv", "imu0/data.csv", "oxts/timestamps.txt", "imuShort.txt"])
+def test_a_folder_of_many_things_is_not_taken_for_a_log_in_it(name: str, tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, f"a/b/{name}", "a/b/x/other.txt")
+    assert data_format(folder) in ("phone", "euroc", "kitti-oxts", "sbg")
+    with pytest.raises(InputError, match="is a folder of no known log"):
+        data_format(folder_with(tmp_path, "notes.txt"))
+
+
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is a folder of no known log; expected a file, or EuRoC"):
         data_format(folder_with(tmp_path, "notes.txt"))

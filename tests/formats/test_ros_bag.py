@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from shutil import make_archive
 from typing import Any
 
 import numpy as np
@@ -308,3 +309,26 @@ def test_a_bag_without_anything_to_navigate_with(tmp_path: Path) -> None:
     text = make("std_msgs/msg/String", data="hello")
     with pytest.raises(InputError, match="holds no messages of"):
         read(bag(tmp_path, [("/text", BEGIN, text)]))
+
+
+@pytest.mark.parametrize("plugin", list(StoragePlugin))
+def test_the_folder_of_a_bag_is_the_bag(plugin: StoragePlugin, tmp_path: Path) -> None:
+    file = bag(tmp_path, [("/imu", t, imu(t, *STILL)) for t in times()], plugin)
+    assert data_format(file.parent) == data_format(file)
+    one, other = read(file.parent).imus["/imu"], read(file).imus["/imu"]
+    np.testing.assert_array_equal(one.time, other.time)
+    np.testing.assert_array_equal(one.dvel, other.dvel)
+
+
+@pytest.mark.parametrize("store", [ROS1, ROS2])
+def test_a_bag_is_known_by_what_is_in_it(store: Any, tmp_path: Path) -> None:
+    file = bag(tmp_path, [("/imu", t, imu(t, *STILL, store)) for t in times()], store=store)
+    renamed = file.rename(tmp_path / "recording.dat")
+    assert len(read(renamed).imus["/imu"].time) == 50
+
+
+def test_an_archive_of_a_bag_is_refused(tmp_path: Path) -> None:
+    file = bag(tmp_path, [("/imu", t, imu(t, *STILL)) for t in times()])
+    packed = make_archive(str(tmp_path / "packed"), "zip", file.parent)
+    with pytest.raises(InputError, match="expected it unpacked"):
+        read(packed)

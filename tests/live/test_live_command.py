@@ -124,9 +124,9 @@ def test_standard_input_gives_what_the_replay_gives(
     assert said["refused"] == summary(replayed[1])["refused"]
 
 
-def program(drive: Path, out: Path, *more: str, speed: int = 20) -> subprocess.Popen[bytes]:
-    """Start the command as a process of its own."""
-    command = [sys.executable, "-c", PROGRAM, "live", str(drive), "--out", str(out), "--speed", str(speed), *more]
+def program(drive: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
+    """Start the command as a process of its own, slow enough that a busy machine stops it before the recording ends."""
+    command = [sys.executable, "-c", PROGRAM, "live", str(drive), "--out", str(out), "--speed", "4", *more]
     # unbuffered: what readline had read ahead, communicate would not see
     return subprocess.Popen(
         command, bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=Path(__file__).parent
@@ -157,8 +157,7 @@ def test_nmea_goes_over_tcp_and_udp_until_sigint(drive: Path, tmp_path: Path) ->
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(FAR)
         sinks = ("ndjson:", f"nmea+tcp://:{port}?rate=4", f"nmea+udp://127.0.0.1:{receiver.getsockname()[1]}?rate=5")
-        # slow enough that a busy machine has read three readers' lines before the recording ends
-        with program(drive, tmp_path, *(word for url in sinks for word in ("--sink", url)), speed=4) as process:
+        with program(drive, tmp_path, *(word for url in sinks for word in ("--sink", url))) as process:
             by_udp = receiver.recv(1000).decode()
             with socket.create_connection(("127.0.0.1", port)) as client, client.makefile("r", newline="") as stream:
                 by_tcp = [stream.readline() for _ in range(9)]

@@ -619,6 +619,55 @@ def test_steady_acceleration_is_no_standstill() -> None:
     assert find_standstill(quiet, None, True, 0.1) is not None
 
 
+def quiet_for(duration: float, rate: float) -> Aligned:
+    """An IMU that shows nothing but gravity and one rate about the vertical, rad/s."""
+    time = np.arange(1, round(duration * RATE_HZ)) / RATE_HZ
+    rows = np.zeros((len(time), 6, 1))
+    rows[:, 2], rows[:, 5] = rate / RATE_HZ, -9.81 / RATE_HZ
+    return Aligned(time, rows, (), np.zeros((len(time), 1), dtype=bool))
+
+
+def around_a_circle(speed: float, rate: float, interval: float, std: float, *, velocity: bool) -> GnssStream:
+    """Fixes of 60 s on a plane, with noise."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 60.0, interval)
+    angle, radius = rate * time, speed / rate
+    place = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)])
+    moves = speed * np.column_stack([-np.sin(angle), np.cos(angle), np.zeros_like(angle)])
+    return GnssStream(
+        time,
+        place + rng.normal(0.0, std, place.shape),
+        np.full(place.shape, std),
+        moves + rng.normal(0.0, 0.1, place.shape) if velocity else None,
+        np.full(place.shape, 0.1) if velocity else None,
+    )
+
+
+@pytest.mark.parametrize("interval", [0.1, 1.0])
+@pytest.mark.parametrize("velocity", [False, True])
+def test_a_steady_circle_is_no_standstill(interval: float, velocity: bool) -> None:
+    """What comes back does not drift, and a gyro alone could take the turn for its bias."""
+    rate = 6.0 * DEG
+    assert find_standstill(quiet_for(60.0, rate), None, False, 0.1) is not None
+    moving = around_a_circle(1.5, rate, interval, 0.02, velocity=velocity)
+    assert find_standstill(quiet_for(60.0, rate), moving, False, 0.1) is None
+    resting = around_a_circle(1e-9, rate, interval, 0.02, velocity=velocity)
+    assert find_standstill(quiet_for(60.0, rate), resting, False, 0.1) is not None
+
+
+def test_fixes_that_are_worse_than_they_state_are_still_at_rest() -> None:
+    for seed in range(20):
+        stream = around_a_circle(1e-9, 0.1, 0.2, 0.02, velocity=False)
+        noisy = np.random.default_rng(seed).normal(0.0, 0.06, stream.position.shape)
+        assert (
+            find_standstill(quiet_for(60.0, 0.0), replace(stream, position=stream.position + noisy), False) is not None
+        )
+
+
+def test_a_steady_turn_is_no_bias() -> None:
+    assert find_standstill(quiet_for(60.0, 17.0 * DEG), None, False, 0.1) is None
+
+
 @pytest.mark.parametrize("at", [0.01, 8.0])
 def test_a_heading_of_one_instant_is_carried_to_the_start(at: float) -> None:
     turning = path(Profile(Swing(10.0), Swing(0.02), Swing(-0.03), Swing(-2.0, 0.1)), duration=20.0)

@@ -260,6 +260,7 @@ def common_imu(logs: Path) -> np.ndarray:
     ("name", "turned", "offset"),
     [
         ("xsens-mt/mt.txt", [1, -1, -1], 99.975),
+        ("preamble/imu.csv", [1, 1, 1], 36000.0),
         ("euroc", [1, 1, 1], 1403636579.758555392),
         ("euroc/mav0/imu0/data.csv", [1, 1, 1], 1403636579.758555392),
     ],

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from polyins.model.recording import Recording
+from polyins.studies.reproduction import leaves
 from polyins.studies.robustness.case import Case, cases, good
 from polyins.studies.robustness.fault import during, unchanged
 from polyins.studies.robustness.lies import LIES, told_lie
-from polyins.studies.robustness.table import Row, judged, summary
+from polyins.studies.robustness.table import Row, document, judged, print_tables, summary
 
 SEEDS = (0, 2)
 ALL = cases(SEEDS)
@@ -86,6 +89,24 @@ def test_the_sums_count_what_is_wrong_in_silence() -> None:
     assert (sums["cases"], sums["refused"], sums["silent_wrong"]) == (5, 1, 2)
     assert sums["named_percent"] == 50.0
     assert sums["trusted_if_harmless_percent"] == 100.0
+
+
+def test_a_document_lists_cases_by_name_and_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [
+        Row("late", "gnss", "single", 5.0, 12.0, "doubt", True, ("delay",)),
+        Row("odd", "imu", "single", None, None, "refused", True, ()),
+    ]
+    said = json.loads(json.dumps(document(rows, [])))
+    assert [case["name"] for case in said["cases"]] == ["late", "odd"]
+    assert {"stream", "method", "error_ratio", "error_over_std", "verdict", "named"} < set(said["cases"][0])
+    assert said["cases"][1]["error_ratio"] is None
+    assert {"cases", "silent_wrong", "nan", "named_percent", "trusted_if_harmless_percent", "false_findings"} < set(
+        said["summary"]
+    )
+    print_tables(said)
+    assert "late" in capsys.readouterr().out
+    page = dict(leaves(said))
+    assert page["cases / late / error_ratio"] == "5.000"
 
 
 @pytest.mark.parametrize(("name", "metres"), [("10 m for 5 s", 0.5), ("1 cm told, 1 m true, always", 3.0)])

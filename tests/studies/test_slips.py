@@ -11,7 +11,7 @@ from polyins.evaluation.verdict import of_measurements
 from polyins.navigate import batch
 from polyins.simulation.run import TrueRun, true_run
 from polyins.studies.robustness.case import SCENARIOS
-from polyins.studies.robustness.slips import APART, LEAST_SPEED, WHO, SlipPeriod, drawn, is_found, slipping
+from polyins.studies.robustness.slips import APART, LEAST_SPEED, WHO, OneSlip, drawn, is_found, slipping
 
 SEED = 2
 
@@ -31,9 +31,9 @@ def test_slips_are_apart_and_fast(run: TrueRun) -> None:
 
 def test_one_slip_of_one_wheel_is_found_and_nothing_else(run: TrueRun) -> None:
     begin = next(one.begin for one in drawn(run, np.random.default_rng(SEED)))
-    slip = SlipPeriod(begin, 0.5, 0.1, 0)
+    slip = OneSlip(begin, 0.5, 0.1, 0)
     solution = batch.run(slipping(run, [slip], WHO[0], SEED), "triple-ins")
     findings = [one for one in of_measurements(solution.measurements) if one.kind == "slip"]
     assert len(findings) == 1
     assert is_found(slip, findings)
-    assert not is_found(SlipPeriod(begin + 30.0, 0.5, 0.1, 0), findings)
+    assert not is_found(OneSlip(begin + 30.0, 0.5, 0.1, 0), findings)

@@ -126,12 +126,16 @@ def check_track(track: Track, what: str) -> tuple[str, ...]:
 
 
 def _check_heights_and_speeds(track: Track) -> None:
-    """Raise InputError for heights above the air, and for velocities far from what the positions change by."""
+    """Raise InputError where heights are above the air or velocities far from what the positions change by.
+
+    A few wrong ones among others are for the filter's gate.
+    """
     height = track.position[:, 2]
-    for row in np.flatnonzero(np.abs(height) > HIGHEST_M)[:1]:
+    above = np.flatnonzero(np.abs(height) > HIGHEST_M)
+    if 2 * len(above) > len(height):
         raise InputError(
-            f"{track.source.place(int(row))}: height is {height[row]:.6g} m; expected at most {HIGHEST_M:g} m: is it "
-            "in mm? (columns.position.scale)"
+            f"{track.source.place(int(above[0]))}: height is {height[above[0]]:.6g} m; expected at most "
+            f"{HIGHEST_M:g} m: is it in mm? (columns.position.scale)"
         )
     if track.velocity is None or len(track.time) < 3:
         return

@@ -85,10 +85,16 @@ def is_bundle(path: str | Path) -> bool:
 
 
 def head(path: str | Path, count: int) -> bytes:
-    """Return what a log is recognised by: the first bytes of a file, the names in a folder or an archive."""
+    """Return what a log is recognised by: the first bytes of a file, the names in a folder or an archive.
+
+    A folder that all of them are in is left out.
+    """
     if not is_bundle(path):
         return read_head(path, count)
-    return LISTING + "\n".join(Bundle(find(path)).names).encode()
+    names = [name for name in Bundle(find(path)).names if "__MACOSX/" not in name]
+    while names and len({name.partition("/")[0] for name in names}) == 1 and all("/" in name for name in names):
+        names = [name.partition("/")[2] for name in names]
+    return LISTING + "\n".join(names).encode()
 
 
 def state(path: Path) -> tuple[int, int]:

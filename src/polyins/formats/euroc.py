@@ -34,7 +34,7 @@ TAKEN_FOR_EAST = "its x, y, z are taken for east, north, up: headings count from
 def fits(head: bytes) -> bool:
     """Whether it is such a file, or a folder with an IMU of this kind."""
     if head.startswith(LISTING):
-        return re.search(rb"(?m)^(.*/)?(imu\d*/data\.csv|mav0/.*)$|^data\.csv$", head) is not None
+        return re.search(rb"(?m)^(mav0/)?imu\d*/data\.csv$|^mav0/|^data\.csv$", head) is not None
     return HEADER.match(head.removeprefix(b"\xef\xbb\xbf")) is not None
 
 

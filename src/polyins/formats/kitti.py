@@ -36,7 +36,7 @@ def fits(head: bytes) -> bool:
     """Whether it is a folder with such a stream, or the stream's own."""
     if not head.startswith(LISTING):
         return False
-    within = re.search(rb"(?m)^(.*/)?oxts/timestamps\.txt$", head)
+    within = re.search(rb"(?m)^([^/\n]+/)?oxts/timestamps\.txt$", head)
     own = re.search(rb"(?m)^timestamps\.txt$", head) and re.search(rb"(?m)^data/\d+\.txt$", head)
     return bool(within or own)
 

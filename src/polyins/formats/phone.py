@@ -33,7 +33,7 @@ NANOSECONDS = "time"
 
 def fits(head: bytes) -> bool:
     """Whether it is a folder or an archive with a file of a gyroscope or an accelerometer."""
-    return head.startswith(LISTING) and re.search(rb"(?m)^(.*/)?(Gyroscope|Accelerometer)\.csv$", head) is not None
+    return head.startswith(LISTING) and re.search(rb"(?m)^(Gyroscope|Accelerometer)\.csv$", head) is not None
 
 
 def read(path: str | Path) -> Log:

@@ -51,8 +51,17 @@ def _begins(*signatures: bytes) -> Callable[[bytes], bool]:
 
 
 def _is_ros2_sqlite(head: bytes) -> bool:
-    """Whether a database has the tables of a ROS 2 bag: their text stands on the first page."""
-    return head.startswith(b"SQLite format 3\0") and b"serialization_format" in head
+    """Whether a database has the tables of a ROS 2 bag, whose text stands on its first page, or a folder holds such."""
+    return (head.startswith(b"SQLite format 3\0") and b"serialization_format" in head) or _is_ros2_folder(head, b".db3")
+
+
+def _is_mcap(head: bytes) -> bool:
+    return head.startswith(b"\x89MCAP0\r\n") or _is_ros2_folder(head, b".mcap")
+
+
+def _is_ros2_folder(head: bytes, suffix: bytes) -> bool:
+    names = head.splitlines()
+    return head.startswith(bundle.LISTING) and b"metadata.yaml" in names and any(n.endswith(suffix) for n in names)
 
 
 @dataclass(frozen=True)
@@ -75,7 +84,7 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("dataflash", "ArduPilot DataFlash", _begins(b"\xa3\x95\x80\x80"), "dataflash", "pymavlink", "ardupilot"),
     LogFormat("ros1-bag", "ROS 1 bag", _begins(b"#ROSBAG V2"), "ros_bag", "rosbags", "ros"),
     LogFormat("ros2-sqlite", "ROS 2 bag (SQLite)", _is_ros2_sqlite, "ros_bag", "rosbags", "ros"),
-    LogFormat("mcap", "MCAP of ROS 2", _begins(b"\x89MCAP0\r\n"), "ros_bag", "rosbags", "ros"),
+    LogFormat("mcap", "MCAP of ROS 2", _is_mcap, "ros_bag", "rosbags", "ros"),
     LogFormat("ubx", "u-blox UBX", ublox.fits, "ublox", "pyubx2", "ubx"),
     LogFormat("nmea", "NMEA 0183", nmea_log.fits, "nmea_log", "", ""),
     LogFormat("xsens-mt", "Xsens MT Manager text", xsens_mt.fits, "xsens_mt", "", ""),
@@ -89,7 +98,7 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("euroc", "EuRoC (ASL) folder", euroc.fits, "euroc", "", ""),
     LogFormat("mimu4444", "MIMU4444", mimu4444.fits, "mimu4444", "", ""),
 )
-FOLDERS = ("EuRoC", "KITTI", "phyphox", "Sensor Logger", "SBG")
+FOLDERS = ("ROS 2 bag", "EuRoC", "KITTI", "phyphox", "Sensor Logger", "SBG")
 """what is read of folders and zip archives"""
 
 NOT_READ: dict[str, Callable[[bytes], bool]] = {

@@ -9,15 +9,18 @@ are taken as east, north, up and forward, left, up (REP 103).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.files import find
+from polyins.files import find, read_head
 from polyins.formats import ros_fields
+from polyins.formats.bundle import is_bundle
 from polyins.formats.library import damage_named, needed
 from polyins.formats.log import Clock, Log
 from polyins.formats.ros_streams import (
@@ -45,6 +48,8 @@ MENDED = {
     ".db3": " sqlite3 FILE .recover mends one whose end is missing",
 }
 """by suffix, the tools that people have"""
+BEGINS = {".bag": b"#ROSBAG V2", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
+"""by suffix, how such files begin"""
 SAME_CLOCK_S = 10.0
 """by which a header's stamp may be off the time of recording, if both are Unix time"""
 
@@ -52,10 +57,12 @@ SAME_CLOCK_S = 10.0
 def read(path: str | Path) -> Log:
     """Read the streams; raises InputError for a damaged file, none of these messages, or without rosbags."""
     found = find(path)
+    if is_bundle(found) and found.is_file():
+        raise InputError(f"{found}: is an archive of a ROS 2 bag; expected it unpacked")
     highlevel, types = needed("rosbags.highlevel", "ros", found), needed("rosbags.typesys", "ros", found)
     with damage_named(found, "a ROS bag", MENDED.get(found.suffix, "")):
         known = types.get_typestore(types.Stores.LATEST)
-        with highlevel.AnyReader([found], default_typestore=known) as bag:
+        with _under_its_suffix(found) as named, highlevel.AnyReader([named], default_typestore=known) as bag:
             topics, notes = _topics(bag)
         if not topics:
             raise InputError(f"{found}: holds no messages of {', '.join(VALUES)} with a use; expected some")
@@ -79,6 +86,20 @@ def read(path: str | Path) -> Log:
             ),
             clock_offsets={topic: one.shift for topic, one in topics.items() if one.shift},
         )
+
+
+@contextmanager
+def _under_its_suffix(path: Path) -> Iterator[Path]:
+    """Give a bag under a name by which rosbags, which goes by names, knows what it is."""
+    head = read_head(path, 16) if path.is_file() else b""
+    suffix = next((suffix for suffix, begin in BEGINS.items() if head.startswith(begin)), path.suffix)
+    if path.suffix == suffix:
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        named = Path(folder) / f"bag{suffix}"
+        named.symlink_to(path.resolve())
+        yield named
 
 
 def _moved(topics: Mapping[str, Topic]) -> tuple[str, ...]:

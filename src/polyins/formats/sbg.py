@@ -48,7 +48,7 @@ COUNTER_RANGE = 2**32
 def fits(head: bytes) -> bool:
     """Whether it is the file of an IMU, or a folder with one."""
     if head.startswith(LISTING):
-        return re.search(rb"(?m)^(.*/)?imu(Data|Short|Fast)\.txt$", head) is not None
+        return re.search(rb"(?m)^imu(Data|Short|Fast)\.txt$", head) is not None
     return HEADER in head.partition(b"\n")[0]
 
 

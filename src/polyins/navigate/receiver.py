@@ -34,10 +34,10 @@ MEDIAN_OF_NIS = 2.366
 """of three components, for innovations that are what is stated"""
 WRONG = 9.0
 """times that median, from which it is the prediction that disagrees: innovations are three times as large as stated"""
-LOST = 100.0
-"""times that median, from which a reset has not helped: innovations are ten times as large as stated"""
+LOST = 138.6
+"""horizontal NIS from which a reset has not helped a fix: a hundred times the median of two components"""
 HELPED = 33.0
-"""fixes after a reset that did not disagree so: at first its own variances cover much"""
+"""fixes after a reset of which most did not disagree so: at first its own variances cover much"""
 MOST_RESETS = 3
 """in a row: what they leave as it is, velocity, attitude and biases, is wrong"""
 TOO_SURE = 16.0
@@ -54,13 +54,14 @@ SMALL, SMALL_LASTS, LASTS = 20.0, 10.0, 14.95
 CHANGES, COUNT, AFTER, SPREAD, KNOWN, LAST = 0, 33, 34, 37, 40, 41
 SERIES, SINCE, OFFSET, DOUBTS, BEFORE, CHANGED, FIRST, SPEED_VARIANCE = 42, 43, 44, 47, 48, 51, 52, 53
 BELIEVED, DISAGREED = 54, 55
-RESETS, SINCE_RESET, IS_HOPELESS, HOPELESS_AT = 66, 67, 68, 69
+RESETS, SINCE_RESET, IS_HOPELESS, HOPELESS_AT, LOST_SINCE = 66, 67, 68, 69, 70
 """places in the receiver's part of the scalars: differences of changes, how many were noted; the innovation, and its
 variance by the prediction, after the last update; whether there was one, and when; whether a series lasts, since when,
 and what began it; how many fixes have to be good until one that is wrong is an exception again; the last change, and
 whether there was one; when the first of the latest doubts was; the variance that a reset gives the velocity, or 0; how
 many fixes were believed, and by how many sigma each of the last ones disagreed with the prediction; resets of which
-none has helped yet, and fixes that were believed since the last one; whether the state is given up, and when"""
+none has helped yet, and fixes that were believed since the last one; whether the state is given up, and when; how many
+of those fixes disagree"""
 
 LOCKED_OUT = 30.0
 """s of doubts without a fix that is believed, after which it is the prediction that is wrong"""
@@ -134,25 +135,30 @@ def _median(scalars: Array, first: int, apart: int, count: int) -> float:
 
 
 @scalar_kernel
-def note_believed(scalars: Array, nis: float) -> None:
-    """Note by how much a fix that is believed disagrees with the prediction."""
+def note_believed(scalars: Array, innovation: Array, nis: float) -> None:
+    """Note by how much a fix that is believed disagrees with the prediction.
+
+    To begin anew takes the heading, which only what is horizontal can tell to be wrong.
+    """
     row = int(scalars[RECEIVER + BELIEVED]) % RING
     scalars[RECEIVER + DISAGREED + row] = math.sqrt(nis)
     scalars[RECEIVER + BELIEVED] += 1.0
     scalars[RECEIVER + SINCE_RESET] += 1.0
+    horizontal = innovation[0] ** 2 / max(innovation[3], 1e-30) + innovation[1] ** 2 / max(innovation[4], 1e-30)
+    scalars[RECEIVER + LOST_SINCE] += horizontal > LOST
     if scalars[RECEIVER + RESETS] == 0.0 or scalars[RECEIVER + SINCE_RESET] < RING:
         return
-    if disagreement(scalars) > LOST:
+    if 2.0 * scalars[RECEIVER + LOST_SINCE] > scalars[RECEIVER + SINCE_RESET]:
         _give_up(scalars)
     elif scalars[RECEIVER + SINCE_RESET] >= HELPED:
         scalars[RECEIVER + RESETS] = 0.0
 
 
 @scalar_kernel
-def note_reset(scalars: Array) -> None:
+def note_reset(scalars: Array, innovation: Array) -> None:
     """Note that the position was set to a fix."""
-    scalars[RECEIVER + RESETS] += 1.0
-    scalars[RECEIVER + SINCE_RESET] = 0.0
+    scalars[RECEIVER + RESETS] += innovation[0] ** 2 + innovation[1] ** 2 > innovation[2] ** 2
+    scalars[RECEIVER + SINCE_RESET] = scalars[RECEIVER + LOST_SINCE] = 0.0
     if scalars[RECEIVER + RESETS] >= MOST_RESETS:
         _give_up(scalars)
 

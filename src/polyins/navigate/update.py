@@ -306,7 +306,7 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) 
     if passes and (noisy or not of_series):
         scalars[RECEIVER + receiver.SERIES] = 0.0
         scalars[RECEIVER + receiver.DOUBTS] = max(0.0, scalars[RECEIVER + receiver.DOUBTS] - 1.0)
-        receiver.note_believed(scalars, innovation[NIS])
+        receiver.note_believed(scalars, innovation, innovation[NIS])
         return ACCEPTED
     if scalars[RECEIVER + receiver.SERIES] == 0.0:
         scalars[RECEIVER + receiver.FIRST] = scalars[TIME]
@@ -316,7 +316,7 @@ def _decide(state: State, plan: Plan, work: Work, rows: int, innovation: Array) 
         receiver.begin_series(scalars, innovation)
     if (of_series and receiver.has_lasted(scalars)) or receiver.is_locked_out(scalars, innovation):
         scalars[RECEIVER + receiver.SERIES] = scalars[RECEIVER + receiver.DOUBTS] = 0.0
-        receiver.note_reset(scalars)
+        receiver.note_reset(scalars, innovation)
         return RESET
     receiver.doubt(work.measurement, innovation, of_series)
     return DEWEIGHTED

@@ -29,6 +29,8 @@ STILL_RATE = 0.4 * DEG  # rad/s, of the averaged gyro within a window
 STILL_FORCE = 0.10  # m/s^2
 SHORTEST_STANDSTILL = 3.0  # s
 SLOW = 1.0  # m/s: what drifts that fast has to be told from rest
+LARGEST_BIAS = 10.0 * DEG  # rad/s, of a gyro: more is a turn
+FEWEST_OF_PIECE = 5  # fixes that show a drift beside their noise
 LONGEST_STANDSTILL = 60.0  # s
 FARTHEST_START = 10e3  # m from GNSS: farther away it is another place
 LEAST_LEFT = 1.0  # s, of data after the start
@@ -732,7 +734,8 @@ def find_standstill(
 
     Judged second by second: rates and forces averaged over tenths of a second hardly vary, and the usual speed that
     GNSS gives, where it gives one, is that of its noise. Over the whole interval the mean force is gravity but for
-    `bias`, m/s^2, and the fixes keep to their place but for their noise: steady acceleration or motion is none.
+    `bias`, m/s^2, the rate no more than a gyro's bias, and the fixes keep to their place but for their noise: steady
+    acceleration, turn or motion is none.
     """
     window = max(2, round(WINDOW * aligned.rate_hz))
     tenth = max(1, round(0.1 * aligned.rate_hz))
@@ -756,10 +759,10 @@ def find_standstill(
         until = float(min(edges[end], edges[begin] + LONGEST_STANDSTILL))
         if until - edges[begin] < SHORTEST_STANDSTILL:
             continue
-        if feels_gravity(aligned, float(edges[begin]), until, bias) and keeps_place(
-            fixes, geodetic, float(edges[begin]), until
-        ):
-            return float(edges[begin]), until
+        interval = float(edges[begin]), until
+        by_imus = feels_gravity(aligned, *interval, bias) and hardly_turns(aligned, *interval)
+        if by_imus and keeps_place(fixes, geodetic, *interval):
+            return interval
     return None
 
 
@@ -771,22 +774,54 @@ def feels_gravity(aligned: Aligned, begin: float, end: float, bias: float) -> bo
     return bool(abs(float(np.median(forces)) - 9.81) <= 0.15 + bias)
 
 
+def hardly_turns(aligned: Aligned, begin: float, end: float) -> bool:
+    """Whether the mean rate of an interval is one that biases explain, not that of a steady turn."""
+    part = aligned.between(begin, end)
+    rates = np.linalg.norm(part.increments[1:, :3].sum(axis=0), axis=0) / (part.time[-1] - part.time[0])
+    return bool(np.median(rates) <= LARGEST_BIAS)
+
+
 def keeps_place(fixes: GnssStream | None, geodetic: bool, begin: float, end: float) -> bool:
-    """Whether fixes of an interval do not drift beyond their noise, which tells a slow drive from rest."""
+    """Whether fixes of an interval do not drift beyond their noise, which tells a slow drive from rest.
+
+    Neither over all of it, nor in most of its pieces: on a circle what moves comes back.
+    """
     if fixes is None:
         return True
     inside = np.flatnonzero((fixes.time >= begin) & (fixes.time <= end))
     if len(inside) < 3:
         return True
     if fixes.velocity is not None and fixes.velocity_std is not None:
-        mean = np.linalg.norm(fixes.velocity[inside].mean(axis=0)[:2])
-        if mean > 4.0 * float(np.median(fixes.velocity_std[inside, :2])) / np.sqrt(len(inside)) + 0.1:
+        velocity, noise = fixes.velocity[inside, :2], 4.0 * float(np.median(fixes.velocity_std[inside, :2]))
+        mean = np.linalg.norm(velocity.mean(axis=0))
+        if mean > noise / np.sqrt(len(inside)) + 0.1 or np.median(np.linalg.norm(velocity, axis=1)) > noise + 0.1:
             return False
     time = fixes.time[inside] - fixes.time[inside].mean()
     place = displacement(fixes.position[inside], fixes.position[inside[0]], geodetic)[:, :2]
-    drift = np.hypot(*np.polyfit(time, place, 1)[0])
-    std = float(np.median(fixes.position_std[inside, :2])) / np.sqrt(float(np.sum(time**2)))
-    return bool(drift <= 4.0 * std + 0.1 <= SLOW)
+    stated = float(np.median(fixes.position_std[inside, :2]))
+    drift, std, _ = _drift(time, place, stated)
+    if not drift <= 4.0 * std + 0.1 <= SLOW:
+        return False
+    moves = []
+    for piece in np.array_split(np.arange(len(time)), _pieces(time)):
+        drift, std, shown = _drift(time[piece], place[piece], stated)
+        moves.append(drift > 4.0 * max(std, shown) + 0.1)
+    return 2 * sum(moves) <= len(moves)
+
+
+def _pieces(time: Array) -> int:
+    """Return into how many pieces fixes are divided, each as long as the shortest standstill and of a few at least."""
+    return max(1, min(int((time[-1] - time[0]) / SHORTEST_STANDSTILL), len(time) // FEWEST_OF_PIECE))
+
+
+def _drift(time: Array, place: Array, stated: float) -> tuple[float, float, float]:
+    """Return the speed of a line through places, m/s, and its std by the noise that is stated, m, and that is shown."""
+    since = time - time.mean()
+    slope, _ = np.polyfit(since, place, 1)
+    beside = place - place.mean(axis=0) - np.outer(since, slope)
+    shown = float(np.sqrt(np.sum(beside**2) / max(2 * (len(time) - 2), 1)))
+    per_metre = 1.0 / float(np.sqrt(np.sum(since**2)))
+    return float(np.hypot(*slope)), stated * per_metre, shown * per_metre
 
 
 def scatter_at_rest(gnss: GnssStream, geodetic: bool, begin: float, end: float) -> Array | None:

@@ -75,9 +75,9 @@ def _over_others(ratio: Array) -> Array:
 
 def _shown(rates: Array) -> Array:
     """Return the std of the noise of each IMU, (N,), of rates (K, 3, N)."""
-    bent = np.diff(rates, n=2, axis=0)
-    quietest = int(np.argmin(np.abs(bent).mean(axis=(0, 1))))
-    variance = (OF_MEAN * np.abs(bent - bent[:, :, quietest, None]).mean(axis=(0, 1))) ** 2
+    bent = np.diff(rates, n=2, axis=0).reshape(-1, rates.shape[2])
+    quietest = int(np.argmin(np.abs(bent).mean(axis=0)))
+    variance = (OF_MEAN * np.abs(bent - bent[:, quietest, None]).mean(axis=0)) ** 2
     # of the quietest and the next one each has half
     half = 0.5 * np.sort(variance)[1]
     return np.asarray(np.sqrt(np.maximum(variance - half, half)))

@@ -111,8 +111,8 @@ def print_document(document: Document) -> None:
 
 def rows_of(document: Document) -> list[list[str]]:
     """Return each figure's path, the paper's and polyins's."""
-    published = dict(_leaves(document["paper"]))
-    figures = dict(_leaves(document["polyins"]))
+    published = dict(leaves(document["paper"]))
+    figures = dict(leaves(document["polyins"]))
     return [[path, published.get(path, "-"), figures.get(path, "-")] for path in dict.fromkeys([*figures, *published])]
 
 
@@ -130,12 +130,16 @@ def _texts(value: object) -> Iterator[str]:
         yield value
 
 
-def _leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:
+def leaves(value: object, path: str = "") -> Iterator[tuple[str, str]]:
+    """Give each number of a document, in words, under the keys or names that lead to it."""
     if isinstance(value, Mapping):
         for key, item in value.items():
-            yield from _leaves(item, f"{path} / {key}" if path else str(key))
+            yield from leaves(item, f"{path} / {key}" if path else str(key))
     elif isinstance(value, list):
-        if not any(isinstance(item, str) for item in value):
+        if any(isinstance(item, Mapping) for item in value):
+            named = {item["name"]: {key: held for key, held in item.items() if key != "name"} for item in value}
+            yield from leaves(named, path)
+        elif not any(isinstance(item, str) for item in value):
             yield path, ", ".join(number(item) for item in value)
     elif not isinstance(value, str):
         yield path, str(value) if isinstance(value, int) else number(value if isinstance(value, float) else None, 3)

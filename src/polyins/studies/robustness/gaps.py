@@ -36,7 +36,7 @@ from polyins.tools.parallel import run_all
 Array = NDArray[np.float64]
 
 SEEDS = (1, 3, 5)
-LENGTHS, QUICK_LENGTHS = (2.0, 10.0, 30.0, 60.0, 150.0, 600.0), (10.0,)
+LENGTHS, LIVE_LENGTHS = (2.0, 10.0, 30.0, 60.0, 150.0, 600.0), (10.0, 150.0)
 """s"""
 AT, AFTER = 120.0, 110.0
 """s before a gap, of which the first are a standstill, and after it"""
@@ -52,7 +52,7 @@ WAYS = ("batch", "live", "resumed")
 
 
 @dataclass(frozen=True)
-class GapVehicle:
+class Carrier:
     """What has the gap."""
 
     name: str
@@ -61,10 +61,10 @@ class GapVehicle:
     gnss: bool
 
 
-VEHICLES = (
-    GapVehicle("array", "fixes", "enav-fusion", True),
-    GapVehicle("wheels with GNSS", "wheels", "triple-ins", True),
-    GapVehicle("wheels", "wheels", "triple-ins", False),
+CARRIERS = (
+    Carrier("array", "fixes", "enav-fusion", True),
+    Carrier("wheels with GNSS", "wheels", "triple-ins", True),
+    Carrier("wheels", "wheels", "triple-ins", False),
 )
 
 
@@ -79,33 +79,69 @@ class StatedErrors(NamedTuple):
     """the larger one of horizontal position and heading over its standard deviation, shape (T,)"""
 
 
+@dataclass(frozen=True)
+class Gap:
+    """What pauses, for how long, and how it is run."""
+
+    carrier: Carrier
+    length: float
+    """s"""
+    way: str
+    seeds: tuple[int, ...]
+    """of the drives"""
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        return f"{self.carrier.name}: {self.length:g} s, {self.way}"
+
+
+CASES = tuple(
+    # live a run takes long, and its states are those of the batch run
+    Gap(carrier, length, way, SEEDS if way == "batch" else SEEDS[:1])
+    for carrier in CARRIERS
+    for length in LENGTHS
+    for way in (WAYS if length in LIVE_LENGTHS else WAYS[:1])
+)
+QUICK_CASES = tuple(
+    replace(one, seeds=SEEDS[:1])
+    for one in CASES
+    if one.length == LIVE_LENGTHS[0] and (one.way == "batch" or not one.carrier.gnss)
+)
+
+
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
-    """Run every vehicle through every gap, or with `quick` through one of ten seconds, and return the document."""
-    seeds, lengths = (SEEDS[:1], QUICK_LENGTHS) if quick else (SEEDS, LENGTHS)
-    cases = [(vehicle, length) for vehicle in VEHICLES for length in lengths]
-    rows = run_all([partial(_rows, *case, seeds) for case in cases], progress=progress)
-    names = [f"{vehicle.name}: {length:g} s" for vehicle, length in cases]
-    settings = {"seeds": list(seeds), "begins_s": AT, "inside_std": INSIDE, "back": BACK}
-    return {"target": "gaps", "paper": {}, "polyins": plain(dict(zip(names, rows, strict=True))), "settings": settings}
+    """Run all gaps, or with `quick` those of ten seconds over one drive, and return the document."""
+    cases = QUICK_CASES if quick else CASES
+    rows = run_all([partial(figures_of, case) for case in cases], progress=progress)
+    settings = {"seeds": list(SEEDS), "seeds_live": list(SEEDS[:1]), "begins_s": AT, "inside_std": INSIDE, "back": BACK}
+    named = {case.name: row for case, row in zip(cases, rows, strict=True)}
+    return {"target": "gaps", "paper": {}, "polyins": plain(named), "settings": settings}
 
 
-def _rows(
-    vehicle: GapVehicle, length: float, seeds: tuple[int, ...], progress: Callable[[float], None]
-) -> dict[str, dict[str, Any]]:
-    """Return the figures of each way, over all seeds."""
-    found: dict[str, list[tuple[StatedErrors, int | None]]] = {way: [] for way in WAYS}
-    for seed in seeds:
-        whole, end = simulate(scenario(vehicle, length), seed=seed), AT + length
-        usual = track(batch.run(whole, vehicle.method), whole)
+def figures_of(case: Gap, progress: Callable[[float], None]) -> dict[str, Any]:
+    """Return the figures of a case, over all seeds."""
+    over: list[Array] = []
+    back: list[int | None] = []
+    end, method = AT + case.length, case.carrier.method
+    for seed in case.seeds:
+        whole = simulate(scenario(case.carrier, case.length), seed=seed)
+        usual = track(batch.run(whole, method), whole)
         error = math.sqrt(float(np.mean(usual.horizontal[usual.time > end] ** 2)))
-        recording = paused(whole, AT, length)
-        batched = batch.run(recording, vehicle.method)
-        for way in WAYS:
-            solution = batched if way == "batch" else live(recording, batched, end if way == "resumed" else None)
-            errors = track(solution, whole)
-            found[way].append((errors, _fixes_until_back(errors, whole, end, BACK * error)))
-            progress(sum(map(len, found.values())) / (len(WAYS) * len(seeds)))
-    return {way: _figures(tracks) for way, tracks in found.items()}
+        recording = paused(whole, AT, case.length)
+        solution = batch.run(recording, method)
+        if case.way != "batch":
+            solution = live(recording, solution, end if case.way == "resumed" else None)
+        found = track(solution, whole)
+        over.append(found.over)
+        back.append(_fixes_until_back(found, whole, end, BACK * error))
+        progress(len(over) / len(case.seeds))
+    every = np.concatenate(over)
+    return {
+        "inside_percent": 100.0 * float(np.mean(every < INSIDE)),
+        "error_over_std": float(np.max(every)),
+        "fixes_until_back": None if None in back else max(one for one in back if one is not None),
+    }
 
 
 def _fixes_until_back(errors: StatedErrors, recording: Recording, end: float, limit: float) -> int | None:
@@ -120,23 +156,14 @@ def _fixes_until_back(errors: StatedErrors, recording: Recording, end: float, li
     return int(np.argmax(back)) + 1 if back.any() else len(fixes)
 
 
-def _figures(tracks: list[tuple[StatedErrors, int | None]]) -> dict[str, Any]:
-    over, back = np.concatenate([track.over for track, _ in tracks]), [one for _, one in tracks]
-    return {
-        "inside_percent": 100.0 * float(np.mean(over < INSIDE)),
-        "error_over_std": float(np.max(over)),
-        "fixes_until_back": None if None in back else max(one for one in back if one is not None),
-    }
-
-
-def scenario(vehicle: GapVehicle, length: float) -> Scenario:
+def scenario(carrier: Carrier, length: float) -> Scenario:
     """Return a drive that is long enough for a gap, s."""
-    known, seconds = SCENARIOS[vehicle.scenario], AT + length + AFTER
+    known, seconds = SCENARIOS[carrier.scenario], AT + length + AFTER
     if known.laps is None:
         return known.model_copy(update={"duration_s": seconds})
     around = 2.0 * (known.laps.length_m + known.laps.width_m) / known.laps.speed_m_s
     laps = known.laps.model_copy(update={"count": math.ceil(seconds / around)})
-    return known.model_copy(update={"laps": laps, "gnss": Fixes() if vehicle.gnss else None})
+    return known.model_copy(update={"laps": laps, "gnss": Fixes() if carrier.gnss else None})
 
 
 def live(recording: Recording, batched: Solution, resumed: float | None) -> Solution:
@@ -202,16 +229,10 @@ def track(solution: Solution, recording: Recording) -> StatedErrors:
 
 
 def print_tables(figures: Mapping[str, Any]) -> None:
-    """Print a row for each vehicle, gap and way."""
+    """Print a row for each case."""
     rows = [
-        [
-            f"{name}, {way}",
-            number(one["inside_percent"], 2),
-            number(one["error_over_std"], 2),
-            number(one["fixes_until_back"]),
-        ]
-        for name, ways in figures.items()
-        for way, one in ways.items()
+        [name, number(one["inside_percent"], 2), number(one["error_over_std"], 2), number(one["fixes_until_back"])]
+        for name, one in figures.items()
     ]
     columns = ["gap in all IMUs", f"inside {INSIDE:g} std, %", "largest error over std", "fixes until back"]
     print_table("gaps", columns, rows)

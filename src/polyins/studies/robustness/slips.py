@@ -47,7 +47,7 @@ WHO = ("one wheel", "all wheels")
 
 
 @dataclass(frozen=True)
-class SlipPeriod:
+class OneSlip:
     """One slip."""
 
     begin: float
@@ -106,13 +106,13 @@ def _row(who: str, method: str, seeds: tuple[int, ...], progress: Callable[[floa
     }
 
 
-def drawn(run: TrueRun, rng: np.random.Generator) -> list[SlipPeriod]:
+def drawn(run: TrueRun, rng: np.random.Generator) -> list[OneSlip]:
     """Return slips of a drive."""
-    slips: list[SlipPeriod] = []
+    slips: list[OneSlip] = []
     time = run.scenario.static_s + 2.0 * APART
     while time < run.path.duration - 2.0 * APART:
         length = float(rng.choice(LENGTHS))
-        slip = SlipPeriod(time, length, float(rng.choice(SHARES) * rng.choice([-1.0, 1.0])), int(rng.integers(2)))
+        slip = OneSlip(time, length, float(rng.choice(SHARES) * rng.choice([-1.0, 1.0])), int(rng.integers(2)))
         if run.path.speed(np.linspace(time, time + length, 20)).min() < LEAST_SPEED:
             time += 1.0
             continue
@@ -121,7 +121,7 @@ def drawn(run: TrueRun, rng: np.random.Generator) -> list[SlipPeriod]:
     return slips
 
 
-def slipping(run: TrueRun, slips: list[SlipPeriod], who: str, seed: int) -> Recording:
+def slipping(run: TrueRun, slips: list[OneSlip], who: str, seed: int) -> Recording:
     """Return the recording of a drive with those slips, of the wheel that each says or of all at once."""
     wheels = []
     for i, module in enumerate(run.scenario.wheels):
@@ -137,12 +137,12 @@ def slipping(run: TrueRun, slips: list[SlipPeriod], who: str, seed: int) -> Reco
     return record(replace(run, wheels=tuple(wheels), spinning=spinning), seed=seed).recording
 
 
-def is_found(slip: SlipPeriod, findings: list[Finding]) -> bool:
+def is_found(slip: OneSlip, findings: list[Finding]) -> bool:
     """Whether a finding is of the time of a slip."""
     return any(_near(slip, one) for one in findings)
 
 
-def _near(slip: SlipPeriod, finding: Finding) -> bool:
+def _near(slip: OneSlip, finding: Finding) -> bool:
     if finding.from_s is None or finding.to_s is None:
         return False
     return finding.from_s < slip.begin + slip.length + NEAR and finding.to_s > slip.begin - NEAR
@@ -153,7 +153,7 @@ def _nothing_rolls(who: str, method: str) -> bool:
     return who == WHO[1] or method.startswith("body-wheel")
 
 
-def _least_error(recording: Recording, method: str, slips: list[SlipPeriod]) -> float:
+def _least_error(recording: Recording, method: str, slips: list[OneSlip]) -> float:
     """Return the rms that the noise of the accelerometers makes of a drive, if each slip is known and none is used.
 
     In a slip of length L the way is off by sqrt(q L^3 / 3), with q the density of the noise of their mean, m^2/s^3.

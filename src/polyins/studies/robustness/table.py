@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -71,13 +71,14 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     return {
         "target": "robustness",
         "paper": {},
-        "polyins": plain({"cases": {row.name: _document(row) for row in rows}, "summary": summary(rows, false)}),
+        "polyins": document(rows, false),
         "settings": {"seeds": list(SEEDS), "costs": COSTS, "harmless": HARMLESS, "covered": COVERED, "wrong": WRONG},
     }
 
 
-def _document(row: Row) -> dict[str, Any]:
-    return {key: value for key, value in asdict(row).items() if key != "name"}
+def document(rows: list[Row], false: list[str]) -> dict[str, Any]:
+    """Return each case and the sums as other programs read them; `false`: said of recordings without a fault."""
+    return cast(dict[str, Any], plain({"cases": [asdict(row) for row in rows], "summary": summary(rows, false)}))
 
 
 def _judged(case: Case, progress: Callable[[float], None]) -> Row:
@@ -169,14 +170,14 @@ def print_tables(figures: Mapping[str, Any]) -> None:
     """Print a row for each case, then the sums."""
     rows = [
         [
-            name,
+            one["name"],
             one["method"],
             number(one["error_ratio"], 3),
             number(one["error_over_std"], 3),
             one["verdict"],
             "yes" if one["named"] else "no",
         ]
-        for name, one in figures["cases"].items()
+        for one in figures["cases"]
     ]
     print_table("robustness", ["fault", "method", "error ratio", "error over std", "verdict", "named"], rows)
     print_table("of all", ["figure", "value"], [[key, number(value)] for key, value in figures["summary"].items()])
