@@ -87,7 +87,7 @@ def test_a_folder_of_many_things_is_not_taken_for_a_log_in_it(name: str, tmp_pat
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is a folder of no known log; expected a file, or EuRoC"):
+    with pytest.raises(InputError, match="is a folder of no known log; expected a file, or ROS 2 bag, EuRoC"):
         data_format(folder_with(tmp_path, "notes.txt"))
     path = tmp_path / "a.zip"
     with zipfile.ZipFile(path, "w") as file:
