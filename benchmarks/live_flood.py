@@ -24,11 +24,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from polyins.live.events import Epoch
 from pyarrow import parquet
 
 from polyins.config.yaml_document import read_yaml, write_yaml
 from polyins.live import lines
-from polyins.live.events import Epoch
 from polyins.live.replay import Replay
 from polyins.reading import loading
 from polyins.simulation import files

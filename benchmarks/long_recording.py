@@ -28,7 +28,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import csv
 
-from polyins.formats.table import IMU_NAMES, LOCAL_NAMES, STD_NAMES
+from polyins.formats.written_table import IMU_NAMES, LOCAL_NAMES, STD_NAMES
 from polyins.tools.bench import machine
 
 RATE_HZ = 200.0

@@ -122,7 +122,7 @@ def run(
     """Run one method over one recording: a configuration (polyins, KF-GINS, Wheel-INS), or the logs that hold it."""
     from polyins.model.methods import find_method
     from polyins.tools import navigation, results
-    from polyins.tools.propose import way_named
+    from polyins.tools.propose.inputs import way_named
 
     gc.set_threshold(COLLECT_AFTER)
     if method is not None:
@@ -136,7 +136,7 @@ def run(
     if imu is not None and known.rig.has_wheels:
         raise InputError(f"--imu {imu}: with wheels an IMU is chosen in the method, as in --method wheel-ins/{imu}")
     name = method or _usual_method(known, imu)
-    streams = {entry.stream: entry.name for entry in settings[0].imus if entry.stream}
+    streams = {entry.stream: entry.name for entry in settings.config.imus if entry.stream}
     index = _imu_index([one.name for one in known.rig.imus], streams.get(imu or "", imu))
     make_folder(out)
     with way_named(inputs), compilation_said(), progress(name) as update:
@@ -154,9 +154,10 @@ def run(
 
 
 def _settings(inputs: tuple[Path, ...]) -> Settings:
-    """Read a configuration, or propose one for logs; what it assumes are warnings."""
+    """Read a configuration, or propose one for logs; what it assumes are warnings and findings."""
     from polyins.reading.loading import read_config
-    from polyins.tools.propose import are_logs, settings_of
+    from polyins.tools.propose.inputs import are_logs
+    from polyins.tools.propose.proposal import settings_of
 
     if not are_logs(inputs):
         return read_config(inputs[0])
@@ -167,9 +168,8 @@ def _open(settings: Settings) -> Recording | LongRecording:
     """Read a recording, or open its files if it is longer than memory."""
     from polyins.reading.loading import load_settings
     from polyins.reading.long_recording import open_long
-    from polyins.tools.propose import doubted
 
-    return doubted(open_long(settings) or load_settings(settings), settings[2])
+    return open_long(settings) or load_settings(settings)
 
 
 def _exit_by(levels: list[Level]) -> None:
@@ -218,7 +218,7 @@ def compare(inputs: tuple[Path, ...], methods: str | None, single_rate: float, o
     """Run several methods over one recording or more, and each IMU on its own; logs make one recording together."""
     from polyins.model.methods import find_method
     from polyins.tools.comparison import Files
-    from polyins.tools.propose import are_logs
+    from polyins.tools.propose.inputs import are_logs
 
     gc.set_threshold(COLLECT_AFTER)
     names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else None
@@ -240,7 +240,7 @@ def _compare(
 ) -> None:
     from polyins.tools import navigation, results
     from polyins.tools.comparison import compare as run_all
-    from polyins.tools.propose import way_named
+    from polyins.tools.propose.inputs import way_named
 
     out = files.folder
     with progress("reading"):
@@ -350,7 +350,8 @@ def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
     from polyins.reading.loading import build, read_config
 
     with progress("reading"):
-        settings, document, warnings = read_config(config)
+        read = read_config(config)
+        settings, document, warnings = read.config, read.document, read.warnings
         recording = build(settings, document, wheels_known=False)
     with progress("calibrate"):
         calibration = estimate(recording)
@@ -591,17 +592,17 @@ def export(solution: Path, target: Path, to: str, method: str | None, columns: s
 def init(files: tuple[Path, ...], out: Path | None) -> None:
     """Look at recordings and write a commented configuration for them."""
     from polyins.files import write_bytes
-    from polyins.tools.propose import check_proposal, propose
+    from polyins.tools.propose.proposal import check_proposal, propose
 
     if out is not None and out.parent.resolve() != Path.cwd():
         # names in a configuration count from its own folder
         files = tuple(file.resolve() for file in files)
-    text = propose(files)
-    check_proposal(text, files, out)
+    proposal = propose(files)
+    check_proposal(proposal, files, out)
     if out is None:
-        click.echo(text)
+        click.echo(proposal.text)
     elif out.exists():
         raise InputError(f"--out {out}: exists; expected the name of a new file")
     else:
-        write_bytes(out, text.encode())
+        write_bytes(out, proposal.text.encode())
         say(f"configuration: {out}")

@@ -11,7 +11,7 @@ import pytest
 from polyins.errors import InputError
 from polyins.formats.euroc import read
 from polyins.formats.recognize import data_format, read_log
-from polyins.tools.propose import propose
+from polyins.tools.propose.proposal import propose
 
 IMU = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
@@ -71,7 +71,7 @@ def test_the_calibration_is_the_proposals(tmp_path: Path) -> None:
     assert log.axes == {"imu0": ("-z", "y", "x")}
     assert log.points == {"imu0": (0.1, 0.2, 0.3)}
     assert log.noise == {"imu0": (0.016968, 0.2)}
-    text = propose([path])
+    text = propose([path]).text
     # the sensor's x is up, so that the body's z, which is along it, is not down
     assert "axes: [-z, -y, -x]" in text
     assert "position_m: [0.1, -0.2, -0.3]" in text

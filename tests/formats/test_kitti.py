@@ -11,7 +11,7 @@ import pytest
 from polyins.errors import InputError
 from polyins.formats.kitti import read
 from polyins.formats.recognize import data_format, read_log
-from polyins.tools.propose import propose
+from polyins.tools.propose.proposal import propose
 
 STAMP = "2011-09-26 13:02:{:012.9f}"
 
@@ -50,7 +50,7 @@ def test_imu_and_pose(tmp_path: Path) -> None:
 
 
 def test_the_pose_is_a_reference_and_the_axes_are_known(tmp_path: Path) -> None:
-    text = propose([drive(tmp_path)])
+    text = propose([drive(tmp_path)]).text
     assert "axes: [x, -y, -z]  # forward, right, down, as the format has them" in text
     assert "gnss:" not in text
     assert "stream: 'pose'" in text.split("reference:")[1]

@@ -12,7 +12,7 @@ from polyins.errors import InputError
 from polyins.formats.mimu4444 import CHIPS, OTHER_SIDE, PACKET, read
 from polyins.formats.recognize import data_format, read_log
 from polyins.model.axes import Axes, axes_matrix
-from polyins.tools.propose import propose
+from polyins.tools.propose.proposal import propose
 
 STEP = 1_024_000
 """ticks of a packet at 62.5 Hz"""
@@ -86,7 +86,7 @@ def test_without_positions_all_chips_are_turned_alike(tmp_path: Path) -> None:
         content = packet.tobytes()[:-2]
         made.append(content + (sum(content) & 0xFFFF).to_bytes(2, "big"))
     path.write_bytes(b"".join(made))
-    text = propose([path])
+    text = propose([path]).text
     assert text.count("axes: [x, y, z]") == 0
     odd, even = (axes_matrix(axes) for axes in named_axes(text)[:2])
     np.testing.assert_array_equal(even, odd @ axes_matrix(OTHER_SIDE))

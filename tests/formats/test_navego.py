@@ -13,7 +13,7 @@ from polyins.errors import InputError
 from polyins.formats.navego import read
 from polyins.formats.recognize import data_format, read_log
 from polyins.tools.inspect import inspect
-from polyins.tools.propose import propose
+from polyins.tools.propose.proposal import propose
 
 
 def imu(rows: int = 200) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def test_imus_receiver_and_reference(version: str, tmp_path: Path) -> None:
 def test_the_proposal(tmp_path: Path) -> None:
     path = tmp_path / "drive.mat"
     savemat(path, {"imu1": imu(), "gnss": gnss(), "ref": reference()})
-    text = propose([path])
+    text = propose([path]).text
     assert "axes: [x, y, z]  # forward, right, down, as the format has them" in text
     assert "angle_random_walk_deg_sqrt_h: 2.06, velocity_random_walk_m_s_sqrt_h: 0.198" in text
     assert "antenna_position_m: [0.1, 0.2, -1.5]" in text

@@ -13,7 +13,7 @@ from polyins.errors import InputError
 from polyins.formats.px4_ulog import read
 from polyins.formats.recognize import data_format
 from polyins.model.rig import DEG
-from polyins.tools.propose import propose
+from polyins.tools.propose.proposal import propose
 
 PACKED = {"uint64_t": "Q", "float": "f", "double": "d", "uint8_t": "B", "bool": "?", "int32_t": "i", "uint32_t": "I"}
 Rows = Sequence[Sequence[float | Sequence[float]]]

@@ -109,6 +109,6 @@ def test_mt_text_is_no_dot(tmp_path: Path) -> None:
 def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.ulg"
     path.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(40))
-    monkeypatch.setattr("polyins.formats.log.import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
+    monkeypatch.setattr("polyins.formats.library.import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
     with pytest.raises(InputError, match=r"is read with pyulog; expected pip install 'polyins\[px4\]'"):
         recognize.read_log(path)

@@ -20,9 +20,9 @@ FIX = GnssFix(7.0, np.array([0.8, 0.2, 500.0]), np.ones(3), np.ones(3), np.ones(
 def conversion(folder: Path, **sections: Any) -> Conversion:
     path = folder / "live.yaml"
     path.write_text(write_yaml({"imus": [IMU, {"name": "b"}], **sections}))
-    config, document, _ = loading.read_config(path)
-    recording, _ = loading.without_data(config, document)
-    return Conversion(config, recording.rig, recording.geodetic)
+    settings = loading.read_config(path)
+    recording, _ = loading.without_data(settings.config, settings.document)
+    return Conversion(settings.config, recording.rig, recording.geodetic)
 
 
 def refusal(one: Conversion, sample: ImuSample | GnssFix) -> str:

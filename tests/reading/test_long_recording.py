@@ -15,7 +15,7 @@ import pytest
 import polyins as pi
 from polyins.errors import InputError
 from polyins.evaluation.summary import summarize
-from polyins.formats import columns, kf_gins, table
+from polyins.formats import kf_gins, parquet_table, text_table, written_table
 from polyins.formats.solution_files import IMU_ERRORS, SOLUTION, read_solution, write_solution
 from polyins.model.recording import AidingStream, ImuStream, Recording, StandstillOptions
 from polyins.model.rig import AidingSensor
@@ -109,9 +109,9 @@ def test_text_is_read_in_order(simulated, suffix, tmp_path, monkeypatch):
     config = files.write(unsynchronised(simulated), tmp_path / "recording")
     for name in ("imu1", "imu2", "imu3"):
         stream = next(one for one in pi.load(config).imus if one.name == name)
-        table.write_imu(tmp_path / "recording" / f"{name}{suffix}", stream)
+        written_table.write_imu(tmp_path / "recording" / f"{name}{suffix}", stream)
     config.write_text(re.sub(r"(imu\d)\.parquet", rf"\1{suffix}", config.read_text()))
-    monkeypatch.setattr(columns, "PIECE_BYTES", 30_000)
+    monkeypatch.setattr(text_table, "PIECE_BYTES", 30_000)
     agree(config, tmp_path, "enav-fusion")
 
 
@@ -122,7 +122,7 @@ def test_files_of_kf_gins_are_read_in_order(simulated, text, tmp_path, monkeypat
     for stream in simulated.imus:
         write(tmp_path / "recording" / f"{stream.name}.imu", stream)
     config.write_text(re.sub(r"(imu\d)\.parquet", r"\1.imu", config.read_text()))
-    monkeypatch.setattr(columns, "PIECE_BYTES", 30_000)
+    monkeypatch.setattr(text_table, "PIECE_BYTES", 30_000)
     monkeypatch.setattr(kf_gins, "PIECE_ROWS", 10_500)
     agree(config, tmp_path, "enav-fusion", 29.0)
 
@@ -251,7 +251,7 @@ def test_rows_that_a_chip_repeats_are_left_out_as_in_memory(simulated, tmp_path,
         dtheta[first:last], dvel[first:last] = dtheta[first], dvel[first]
     frozen = replace(stream, dtheta=dtheta, dvel=dvel)
     config = files.write(replace(simulated, imus=(simulated.imus[0], frozen, simulated.imus[2])), tmp_path / "r")
-    monkeypatch.setattr(columns, "PIECE_ROWS", 16_384)
+    monkeypatch.setattr(parquet_table, "PIECE_ROWS", 16_384)
     recording = pi.load(config)
     assert len(recording.imus[1].time) < len(stream.time) - 790
     solution = pi.run(recording)
@@ -284,7 +284,7 @@ def test_rows_that_are_no_data_are_left_out_as_in_memory(simulated, tmp_path, mo
     dtheta[25_000, 2] = 1e30
     sick = replace(stream, time=time, dtheta=dtheta, dvel=dvel)
     config = files.write(replace(simulated, imus=(*simulated.imus[:2], sick)), tmp_path / "recording")
-    monkeypatch.setattr(columns, "PIECE_ROWS", 16_384)
+    monkeypatch.setattr(parquet_table, "PIECE_ROWS", 16_384)
     recording = pi.load(config)
     assert len(recording.imus[2].time) == len(time) - 13
     assert [(one.kind, one.size) for one in recording.findings] == [("left out", size) for size in (10, 1, 1, 1)]

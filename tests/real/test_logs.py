@@ -27,7 +27,7 @@ from polyins.model.rig import DEG
 from polyins.reading.guess import read_stream
 from polyins.reading.loading import load, load_settings
 from polyins.tools.inspect import inspect
-from polyins.tools.propose import propose, settings_of
+from polyins.tools.propose.proposal import propose, settings_of
 
 LOGS = [
     "ulog/ekf_failure.ulg",
@@ -137,7 +137,7 @@ def check_estimates(log: Log, wanted: dict[str, Any]) -> None:
 @pytest.mark.parametrize("name", LOGS)
 def test_a_proposal_is_a_recording(name: str, logs: Path, tmp_path: Path) -> None:
     config = tmp_path / "proposed.yaml"
-    config.write_text(propose([logs / name]))
+    config.write_text(propose([logs / name]).text)
     recording = load(config)
     assert recording.gnss is not None
     assert len(recording.imus) == (2 if "dataflash" in name else 1)
@@ -190,7 +190,7 @@ def test_positions_computed_afterwards_come_to_the_clock_of_the_log(
 
 
 def test_the_forward_axis_of_a_robot_on_its_side(logs: Path) -> None:
-    assert "axes: [-z, x, -y]" in propose([logs / "rosbag" / "husky.bag"])
+    assert "axes: [-z, x, -y]" in propose([logs / "rosbag" / "husky.bag"]).text
 
 
 def test_a_stream_has_to_be_named_where_there_are_several(logs: Path, tmp_path: Path) -> None:
@@ -219,7 +219,7 @@ def test_an_array_of_bytes(name: str, logs: Path, expected: dict[str, Any], tmp_
     assert said == saturated
     assert log.points["imu8"] == (0.00945, -0.00945, -0.001)
     config = tmp_path / "proposed.yaml"
-    config.write_text(propose([path]))
+    config.write_text(propose([path]).text)
     assert len(load(config).imus) == 8
 
 
@@ -246,7 +246,7 @@ def test_streams_of_vectornav(name: str, logs: Path, expected: dict[str, Any], t
         np.testing.assert_allclose(track.velocity[at], sample[4:7], atol=1e-9)
         np.testing.assert_allclose(track.position_std[at], sample[7:10], atol=1e-9)
     config = tmp_path / "proposed.yaml"
-    config.write_text(propose(paths))
+    config.write_text(propose(paths).text)
     assert load(config).gnss is not None
 
 

@@ -19,7 +19,7 @@ from polyins.model.rig import DEG, STANDARD_GRAVITY
 from polyins.reading.guess import read_table
 from polyins.reading.loading import load
 from polyins.tools.inspect import inspect
-from polyins.tools.propose import assumptions, propose
+from polyins.tools.propose.proposal import propose
 
 HALF_DIGIT = 1.0 + 1e-6
 """of the last one that a file has"""
@@ -116,7 +116,7 @@ def test_rows_in_turn_have_two_imus(cases: Path, expected: dict[str, Any]) -> No
 
 
 def test_a_table_without_header_whose_stamps_are_last(cases: Path, common: np.ndarray, tmp_path: Path) -> None:
-    text = propose([cases / "headerless-7" / "imu.csv"])
+    text = propose([cases / "headerless-7" / "imu.csv"]).text
     assert "kf-gins" not in text
     assert "names: [1, 2, 3], unit: 'g'" in text
     assert "names: [4, 5, 6], unit: 'deg/s'" in text
@@ -133,8 +133,10 @@ def test_lines_that_are_cut_are_named(name: str, lines: str, cases: Path, tmp_pa
 
 
 def test_raw_counts_are_a_proposal_to_check(cases: Path) -> None:
-    text = propose([cases / "raw-counts" / "imu.csv"])
-    assert sum("scale is a guess" in one for one in assumptions(text)) == 1
+    proposal = propose([cases / "raw-counts" / "imu.csv"])
+    text = proposal.text
+    assert sum("scale is a guess" in one.sentence for one in proposal.assumptions) == 1
+    assert sum("scale is a guess" in one.text for one in proposal.findings) == 1
     assert f"scale: [{1 / 2048!r}" in text
     assert f"scale: [{1 / 16.4!r}" in text
 
@@ -216,14 +218,14 @@ def as_good_as_it_is(text: str) -> str:
 
 def test_heights_above_the_sea(cases: Path, tmp_path: Path) -> None:
     folder = cases / "sea-level"
-    text = as_good_as_it_is(propose([folder / "imu.csv", folder / "gnss.csv"]))
+    text = as_good_as_it_is(propose([folder / "imu.csv", folder / "gnss.csv"]).text)
     (height,) = [line for line in text.splitlines() if line.strip().startswith("height:")]
     assert "# CHECK:" in height
     assert "geoid_height_m" in height
     path = tmp_path / "proposed.yaml"
     path.write_text(text.replace(height, "  height: sea-level\n  geoid_height_m: 46.3"))
     assert solved(tmp_path / "out", path, folder / "truth.csv")["vertical_rms_m"] < 0.1
-    with_separation = as_good_as_it_is(propose([folder / "imu.csv", folder / "gnss-separation.csv"]))
+    with_separation = as_good_as_it_is(propose([folder / "imu.csv", folder / "gnss-separation.csv"]).text)
     assert "undulation: 'undulation'" in with_separation
     path.write_text(with_separation)
     assert solved(tmp_path / "other", path, folder / "truth.csv")["vertical_rms_m"] < 0.1
@@ -232,7 +234,7 @@ def test_heights_above_the_sea(cases: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("scale", [[1e-7, 1e-7, 1.0], [1e-7, 1e-7, 1e-3]])
 def test_millimetres_taken_for_metres_are_refused(scale: list[float], cases: Path, tmp_path: Path) -> None:
     path = tmp_path / "drive.yaml"
-    text = propose([cases / "nav-pvt" / "imu.csv", cases / "nav-pvt" / "pvt.csv"])
+    text = propose([cases / "nav-pvt" / "imu.csv", cases / "nav-pvt" / "pvt.csv"]).text
     text = text.replace("scale: [1e-07, 1e-07, 0.001]", f"scale: {scale}")
     path.write_text(text.replace(", scale: [0.001, 0.001, 0.001]}", "}"))
     with pytest.raises(InputError, match=r"is it in mm|columns\.velocity\.scale"):
@@ -243,7 +245,7 @@ def test_a_turn_at_the_end_of_the_range(cases: Path, expected: dict[str, Any]) -
     wanted = expected["saturated-turn"]
     found = load(cases / "saturated-turn" / "config.yaml")
     assert any(f"in {wanted['saturated_rows']} row(s)" in text for text in found.warnings)
-    text = propose([cases / "saturated-turn" / "imu.csv"])
+    text = propose([cases / "saturated-turn" / "imu.csv"]).text
     assert f"gyro_range_deg_s: {wanted['full_scale_deg_s']}" in text
     assert "axes: [x, y, z]" in text
     (stream,) = streams(cases / "saturated-turn" / "imu.csv")

@@ -13,7 +13,7 @@ from synthetic_solutions import drive, solution
 from written_recordings import as_increments, fixes, still_imu, write_config, write_rows
 
 from polyins.errors import InputError
-from polyins.formats import kf_gins, table
+from polyins.formats import kf_gins, table, written_table
 from polyins.formats.recognize import read_log
 from polyins.formats.solution_files import write_solution
 from polyins.reading.guess import read_stream
@@ -119,7 +119,7 @@ def test_a_log_becomes_a_folder_with_a_file_for_each_stream(tmp_path: Path) -> N
     track = table.read_track(fixes_read)
     np.testing.assert_allclose(track.position, log.tracks["/fix"].position, rtol=1e-15)
     np.testing.assert_array_equal(track.position_std[0], [0.1, 0.2, 0.3])
-    assert table.utc_of_zero(fixes_read) == 0.0
+    assert written_table.utc_of_zero(fixes_read) == 0.0
 
 
 def test_what_a_log_became_runs_as_the_log_does(tmp_path: Path) -> None:

@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 
 from polyins.files import find
-from polyins.formats.gps_time import utc_of_week
-from polyins.formats.log import Log, counted, damage_named, fastest, heard, needed, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.library import damage_named, heard, needed
+from polyins.formats.log import Log, counted, fastest
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
+from polyins.model.gps_time import utc_of_week
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -109,8 +111,7 @@ def _tracks(path: Path, tables: dict[str, Table]) -> dict[str, Track]:
 def _track(path: Path, name: str, fixes: Table, accuracies: Table | None) -> Track:
     """Return the fixes in three dimensions, with the accuracies that were logged with them."""
     time, course = fixes["TimeUS"] * 1e-6, fixes["GCrs"] * DEG
-    fixed = np.flatnonzero(fixes["Status"] >= THREE_DIMENSIONS)
-    kept = fixed[rising(time[fixed])]
+    kept = rising(time, fixes["Status"] >= THREE_DIMENSIONS)
     velocity = np.column_stack([fixes["Spd"] * np.cos(course), fixes["Spd"] * np.sin(course), fixes["VZ"]])
     std, velocity_std = _accuracies(fixes["TimeUS"], accuracies)
     if std is not None:

@@ -15,16 +15,17 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.bundle import LISTING, Bundle, is_bundle
-from polyins.formats.log import Clock, Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Clock, Log
+from polyins.formats.rows import ImuRows, RowSource, Track, rising
 from polyins.formats.text_rows import TextRows, read_rows
 from polyins.model.axes import Axes, axes_matrix, right_handed_axes
+from polyins.model.gps_time import EARLIEST_UNIX_S
 from polyins.model.recording import Array
 
 HEADER = re.compile(rb"#timestamp( \[ns\])?, ?(w_RS_S_x|p_RS_R_x|p_R?S?_?x)\b")
 VALUES = r"#timestamp.*|(w_RS_S|a_RS_S|p_\w*?|v_RS_R)_[xyz] .*"
 UNITS = {"w_RS_S": "rad s^-1", "a_RS_S": "m s^-2", "v_RS_R": "m s^-1"}
-EARLIEST_UNIX_S = 1e9
 ESTIMATED = "state_groundtruth"
 """begins the name of what was estimated afterwards; other positions are measured"""
 TAKEN_FOR_EAST = "its x, y, z are taken for east, north, up: headings count from its y"

@@ -14,10 +14,11 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find, opened, read_bytes, read_head, write_bytes
 from polyins.formats.arrow_arrays import to_numpy
-from polyins.formats.columns import PIECE_ROWS, Column, whole_rows
-from polyins.formats.columns import read_in_order as read_text_in_order
+from polyins.formats.column_place import Column
 from polyins.formats.layout import HEAD_BYTES, layout
+from polyins.formats.parquet_table import PIECE_ROWS
 from polyins.formats.rows import ImuRows, RowSource, Track, intervals
+from polyins.formats.text_table import text_pieces, whole_rows
 from polyins.model.geodesy import displacement
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG
@@ -85,7 +86,7 @@ def columns_of(path: str | Path, *, rates: bool = False) -> ImuColumns:
 def read_in_order(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[RowSource, list[Array]]]:
     """Read columns of an IMU file, which have numbers, piece by piece; raises InputError as `read_imu` does."""
     if is_text(read_head(path, HEAD_BYTES)):
-        yield from read_text_in_order(path, wanted)
+        yield from text_pieces(path, wanted)
         return
     with opened(path) as file:
         while content := file.read(ROW_BYTES * PIECE_ROWS):

@@ -14,8 +14,9 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats.bundle import LISTING, Bundle
-from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import RowSource, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log
+from polyins.formats.rows import RowSource, Track, rising
 from polyins.model.axes import Axes
 from polyins.model.recording import Array
 from polyins.model.rig import DEG

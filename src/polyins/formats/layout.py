@@ -214,3 +214,13 @@ def cut_end(content: bytes, table: Dialect, first: int) -> int:
 def is_message(fields: Sequence[str]) -> bool:
     """Whether the cells of a line between the rows are no part of one: it begins with a word."""
     return not _numeric(fields[0])
+
+
+def offset_of_line(content: bytes, line: int) -> int:
+    """Return where a line begins, counted from 0."""
+    at = 0
+    for _ in range(line):
+        at = content.find(b"\n", at) + 1
+        if at == 0:
+            return len(content)
+    return at

@@ -13,11 +13,12 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
-from polyins.formats.gps_time import WEEK_S, utc_of_week
-from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log
+from polyins.formats.rows import ImuRows, RowSource, Track, rising
+from polyins.formats.stamps import unwrapped
 from polyins.formats.text_rows import TextRows, header_line, lines_before, read_rows
-from polyins.model.recording import Array
+from polyins.model.gps_time import WEEK_S, utc_of_week
 from polyins.model.rig import DEG, STANDARD_GRAVITY
 
 HEADER = r"GPS TOW.*\[x8[0-9A-Fa-f]{3}\]"
@@ -61,16 +62,11 @@ def read(path: str | Path) -> Log:
     )
 
 
-def _running_on(second: Array) -> Array:
-    """Return seconds of the week that run on over its end."""
-    return np.asarray(second + np.cumsum(np.diff(second, prepend=second[:1]) < -0.5 * WEEK_S) * WEEK_S)
-
-
 def _imu(path: Path, rows: TextRows) -> ImuRows | None:
     if not rows.has(*FORCES, *RATES):
         return None
     rows = rows.whole(*FORCES, *RATES)
-    time = _running_on(rows.columns["GPS TOW"])
+    time = unwrapped(rows.columns["GPS TOW"], WEEK_S)
     return rates_to_rows(path, "imu", time, rows.of(*RATES), rows.of(*FORCES) * STANDARD_GRAVITY)
 
 
@@ -80,9 +76,8 @@ def _track(path: Path, rows: TextRows) -> Track | None:
         return None
     rows = rows.whole(*PLACE)
     known = (rows.of(*PLACE[:2]) != 0.0).any(axis=1)
-    time = _running_on(rows.columns["GPS TOW"])
-    good = np.flatnonzero(known)
-    kept = good[rising(time[good])]
+    time = unwrapped(rows.columns["GPS TOW"], WEEK_S)
+    kept = rising(time, known)
     if not len(kept):
         return None
     std = rows.of(ACCURACY[0], *ACCURACY)[kept] if rows.has(*ACCURACY) else np.zeros((len(kept), 3))

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes, read_text
-from polyins.formats.log import Log, rates_to_rows
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log
 from polyins.model.axes import Axes
 from polyins.model.recording import Array
 from polyins.model.rig import DEG

@@ -15,8 +15,10 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes, read_head
-from polyins.formats.log import Log, damage_named, needed, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.library import damage_named, needed
+from polyins.formats.log import Log
+from polyins.formats.rows import ImuRows, RowSource, Track, rising
 from polyins.model.recording import Array
 
 HDF5 = b"MATLAB 7.3"

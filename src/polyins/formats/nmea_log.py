@@ -11,16 +11,17 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import reduce
-from operator import xor
 from pathlib import Path
 
 import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
-from polyins.formats.log import Log, counted, damage_named, rising
-from polyins.formats.rows import RowSource, SensorRows, Track
+from polyins.formats.library import damage_named
+from polyins.formats.log import Log, counted
+from polyins.formats.nmea import KNOT, checksum
+from polyins.formats.rows import RowSource, SensorRows, Track, rising
+from polyins.model.gps_time import DAY_S
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -29,8 +30,6 @@ FIXES = {0: "none", 1: "single", 2: "dgps", 3: "pps", 4: "fix", 5: "float", 6: "
 MODES = {"N": 0, "A": 1, "D": 2, "P": 3, "R": 4, "F": 5, "E": 6, "M": 7, "S": 8}
 """of GNS, as the numbers of GGA"""
 MEASURED = (1, 2, 3, 4, 5)
-DAY = 86400.0
-KNOT = 1852.0 / 3600.0
 HEADINGS = ("HDT", "THS", "HDG")
 """the best first"""
 MOST = 0.5
@@ -53,6 +52,11 @@ class _Stated:
     variation: float = np.nan
     """of the magnetic needle, deg, east of north, as RMC said it last"""
     unreadable: int = 0
+
+
+def fits(head: bytes) -> bool:
+    """Whether a line is a sentence."""
+    return any(re.fullmatch(rb"\$[A-Z]{4,6},[ -~]*\*[0-9A-F]{2}", line.strip()) for line in head.splitlines())
 
 
 def read(path: str | Path) -> Log:
@@ -97,7 +101,7 @@ def _sentences(content: bytes) -> Iterator[tuple[str, list[str]]]:
     """Give kind and fields of the sentences whose checksum is right."""
     for match in SENTENCE.finditer(content):
         body = match[0][1 : match[0].rindex(b"*")]
-        if reduce(xor, body) == int(match[4], 16):
+        if checksum(body) == int(match[4], 16):
             yield match[2].decode(), match[3].decode().split(",")
 
 
@@ -194,11 +198,11 @@ def _degrees(text: str, side: str) -> float:
 def _unix_time(stated: _Stated) -> Array:
     """Return Unix time of each stamp: from one to the next the day goes on as the time of day does."""
     second = np.array(stated.seconds)
-    day = np.concatenate([[0.0], np.cumsum(-np.round(np.diff(second) / DAY))])
+    day = np.concatenate([[0.0], np.cumsum(-np.round(np.diff(second) / DAY_S))])
     at, midnight = (np.array(column) for column in zip(*stated.dates, strict=True))
-    first = midnight - day[at] * DAY
+    first = midnight - day[at] * DAY_S
     last = np.searchsorted(at, np.arange(len(second)), "right") - 1
-    return np.asarray(first[np.maximum(last, 0)] + day * DAY + second)
+    return np.asarray(first[np.maximum(last, 0)] + day * DAY_S + second)
 
 
 def _spread(stated: _Stated, kind: str, time: Array) -> tuple[Array, Array]:
@@ -239,8 +243,7 @@ def _headings(path: Path, stated: _Stated, time: Array) -> dict[str, SensorRows]
 def _track(path: Path, kind: str, stated: _Stated, time: Array) -> Track:
     at, latitude, longitude, height, separation, quality = np.array(stated.stamped[kind]).T
     stamps = time[at.astype(int)]
-    fixed = np.flatnonzero(np.isin(quality, MEASURED) & np.isfinite(height))
-    kept = fixed[rising(stamps[fixed])]
+    kept = rising(stamps, np.isin(quality, MEASURED) & np.isfinite(height))
     above_sea = bool(np.isnan(separation[kept]).any())
     std, warnings = _std(stated, stamps[kept], time)
     return Track(

@@ -9,7 +9,7 @@ heights above the ellipsoid; on iOS its accelerations have the opposite sign, wh
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,28 +17,18 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.files import find
 from polyins.formats.bundle import LISTING, Bundle
-from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, Track
+from polyins.formats.joined import at_stamps, joined_rates
+from polyins.formats.log import Log
+from polyins.formats.rows import ImuRows, RowSource, Track, rising
 from polyins.formats.text_rows import TextRows, read_rows
-from polyins.model.recording import Array, usual_interval
+from polyins.model.recording import Array
 from polyins.model.rig import DEG
-from polyins.prepare.timesync import GAP
 
 GYROSCOPE = "Gyroscope"
 FILE = r"(?:meta/)?(Gyroscope|Accelerometer|TotalAcceleration|Gravity|Location|Linear Accelerometer|Metadata|time)\.csv"
 TEXTS = ("Metadata", "time")
 NANOSECONDS = "time"
 """the stamps of Sensor Logger; those of phyphox are in a column Time (s)"""
-
-
-@dataclass(frozen=True)
-class _Samples:
-    """What one sensor says, in order of its stamps."""
-
-    time: Array
-    """s, shape (T,)"""
-    value: Array
-    """shape (T, 3)"""
 
 
 def fits(head: bytes) -> bool:
@@ -78,8 +68,8 @@ def _table(path: Path, name: str, content: bytes) -> TextRows:
     return read_rows(f"{path}, {name}.csv", content, 0, delimiter, wanted=wanted)
 
 
-def _three(path: Path, name: str, rows: TextRows, unit: str) -> _Samples:
-    """Return stamps and the axes x, y, z; raises InputError for columns that are not those of the app."""
+def _three(path: Path, name: str, rows: TextRows, unit: str) -> Array:
+    """Return stamps, s, and the axes x, y, z, shape (T, 4); raises InputError for columns of another app."""
     columns = {}
     for axis in "xyz":
         fitting = [one for one in rows.columns if re.fullmatch(rf"(?i)(.* )?{axis}( \({re.escape(unit)}\))?", one)]
@@ -92,22 +82,7 @@ def _three(path: Path, name: str, rows: TextRows, unit: str) -> _Samples:
     rows = rows.whole(stamp, *columns.values())
     time = rows.columns[stamp] * scale
     kept = rising(time)
-    return _Samples(time[kept], rows.of(*columns.values())[kept])
-
-
-def _at(samples: _Samples, time: Array) -> tuple[Array, Array]:
-    """Return the values at other stamps, and which of these lie between two of its own that are not far apart."""
-    value = np.column_stack([np.interp(time, samples.time, axis) for axis in samples.value.T])
-    if len(samples.time) < 2:
-        return value, np.zeros(len(time), dtype=bool)
-    after = np.clip(np.searchsorted(samples.time, time), 1, len(samples.time) - 1)
-    near = np.diff(samples.time)[after - 1] <= GAP * usual_interval(samples.time)
-    return value, near & (time >= samples.time[0]) & (time <= samples.time[-1])
-
-
-def _imu(path: Path, gyro: _Samples, force: _Samples) -> ImuRows:
-    value, known = _at(force, gyro.time)
-    return rates_to_rows(path, "imu", gyro.time[known], gyro.value[known], value[known])
+    return np.column_stack([time, rows.of(*columns.values())])[kept]
 
 
 def _phyphox(path: Path, tables: dict[str, TextRows], times: str) -> Log:
@@ -118,7 +93,7 @@ def _phyphox(path: Path, tables: dict[str, TextRows], times: str) -> Log:
     starts = _starts(path, times)
     if GYROSCOPE in tables and "Accelerometer" in tables:
         gyro = _three(path, GYROSCOPE, tables[GYROSCOPE], "rad/s")
-        imus["imu"] = _imu(path, gyro, _three(path, "Accelerometer", tables["Accelerometer"], "m/s^2"))
+        imus["imu"] = joined_rates(path, "imu", gyro, _three(path, "Accelerometer", tables["Accelerometer"], "m/s^2"))
         imus["imu"] = replace(imus["imu"], time=_with_pauses(imus["imu"].time, starts))
     else:
         missing = "Accelerometer" if GYROSCOPE in tables else GYROSCOPE
@@ -170,7 +145,7 @@ def _sensor_logger(path: Path, tables: dict[str, TextRows], metadata: str) -> Lo
     notes: list[str] = []
     force = _specific_force(path, tables, metadata, notes)
     if GYROSCOPE in tables and force is not None:
-        imus["imu"] = _imu(path, _three(path, GYROSCOPE, tables[GYROSCOPE], "rad/s"), force)
+        imus["imu"] = joined_rates(path, "imu", _three(path, GYROSCOPE, tables[GYROSCOPE], "rad/s"), force)
     elif GYROSCOPE not in tables:
         notes.append("no Gyroscope.csv: it is needed for an IMU")
     track = None
@@ -180,7 +155,7 @@ def _sensor_logger(path: Path, tables: dict[str, TextRows], metadata: str) -> Lo
     return Log("unix", imus, {"Location": track} if track else {}, {}, utc_of_zero=0.0, notes=tuple(notes))
 
 
-def _specific_force(path: Path, tables: dict[str, TextRows], metadata: str, notes: list[str]) -> _Samples | None:
+def _specific_force(path: Path, tables: dict[str, TextRows], metadata: str, notes: list[str]) -> Array | None:
     """Return the acceleration with gravity; raises InputError if its sign cannot be known."""
     if "TotalAcceleration" in tables and _platform(metadata)[0] != "ios":  # of Android alone, as documented
         return _three(path, "TotalAcceleration", tables["TotalAcceleration"], "m/s^2")
@@ -188,8 +163,9 @@ def _specific_force(path: Path, tables: dict[str, TextRows], metadata: str, note
         notes.append("no TotalAcceleration.csv, nor Accelerometer.csv with Gravity.csv: there is no specific force")
         return None
     moved = _three(path, "Accelerometer", tables["Accelerometer"], "m/s^2")
-    gravity, known = _at(_three(path, "Gravity", tables["Gravity"], "m/s^2"), moved.time)
-    return _Samples(moved.time[known], _sign(path, metadata) * (moved.value + gravity)[known])
+    told = _three(path, "Gravity", tables["Gravity"], "m/s^2")
+    gravity, known = at_stamps(told[:, 0], told[:, 1:], moved[:, 0])
+    return np.column_stack([moved[:, 0], _sign(path, metadata) * (moved[:, 1:] + gravity)])[known]
 
 
 def _platform(metadata: str) -> tuple[str, bool]:
@@ -221,8 +197,7 @@ def _location(
     given = [rows.columns[name] for name in accuracy if name in rows.columns]
     std = np.column_stack([given[0], given[0], given[1]]) if len(given) > 1 else np.full((len(time), 3), np.nan)
     told = (std > 0.0).all(axis=1)
-    good = np.flatnonzero(told if told.any() else np.ones(len(time), dtype=bool))
-    kept = good[rising(time[good])]
+    kept = rising(time, told if told.any() else np.ones(len(time), dtype=bool))
     return Track(
         RowSource(f"{path}, Location"),
         time[kept],

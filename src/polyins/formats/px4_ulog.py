@@ -14,8 +14,10 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats.log import Log, counted, damage_named, fastest, heard, needed, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.library import damage_named, heard, needed
+from polyins.formats.log import Log, counted, fastest
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
 from polyins.model.attitude import euler_angles
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -122,8 +124,7 @@ def _track(path: Path, name: str, topic: Topic) -> Track:
     units = [DEG, DEG, 1.0] if whole else [1e-7 * DEG, 1e-7 * DEG, 1e-3]
     position = np.column_stack([topic[one] for one in names]) * units
     time = topic["timestamp"] * 1e-6
-    fixed = np.flatnonzero(topic["fix_type"] >= THREE_DIMENSIONS)
-    kept = fixed[rising(time[fixed])]
+    kept = rising(time, topic["fix_type"] >= THREE_DIMENSIONS)
     std = np.column_stack([topic["eph"], topic["eph"], topic["epv"]]).astype(float)
     velocity = np.column_stack([topic[f"vel_{axis}_m_s"] for axis in "ned"]).astype(float)
     velocity_std = np.repeat(topic["s_variance_m_s"][:, None].astype(float), 3, axis=1)

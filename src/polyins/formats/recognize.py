@@ -13,7 +13,20 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_head
-from polyins.formats import bundle, euroc, kf_gins, kitti, microstrain, mimu4444, phone, sbg, vectornav, xsens_mt
+from polyins.formats import (
+    bundle,
+    euroc,
+    kf_gins,
+    kitti,
+    microstrain,
+    mimu4444,
+    nmea_log,
+    phone,
+    sbg,
+    ublox,
+    vectornav,
+    xsens_mt,
+)
 from polyins.formats.columns import PARQUET_MAGIC
 from polyins.formats.layout import is_number, sample
 from polyins.formats.log import Log
@@ -23,7 +36,6 @@ from polyins.model.recording import Array
 HEAD_BYTES = 16384
 MOST_ROWS = 100
 """without a header that are looked at"""
-LONGEST_UBX = 4096
 MANY_ROWS = 10
 """make a table of a text that begins with something else"""
 FASTEST_DEG_S = 0.05
@@ -52,25 +64,6 @@ def _is_ros2_folder(head: bytes, suffix: bytes) -> bool:
     return head.startswith(bundle.LISTING) and b"metadata.yaml" in names and any(n.endswith(suffix) for n in names)
 
 
-def _has_ubx(head: bytes) -> bool:
-    """Whether there is a whole message of UBX, by its checksum."""
-    at = head.find(b"\xb5\x62")
-    while at >= 0:
-        end = at + 6 + int.from_bytes(head[at + 4 : at + 6], "little")
-        a = b = 0
-        for byte in head[at + 2 : end] if end - at < LONGEST_UBX else b"":
-            a = (a + byte) & 0xFF
-            b = (b + a) & 0xFF
-        if end - at < LONGEST_UBX and head[end : end + 2] == bytes([a, b]):
-            return True
-        at = head.find(b"\xb5\x62", at + 2)
-    return False
-
-
-def _has_nmea(head: bytes) -> bool:
-    return any(re.fullmatch(rb"\$[A-Z]{4,6},[ -~]*\*[0-9A-F]{2}", line.strip()) for line in head.splitlines())
-
-
 @dataclass(frozen=True)
 class LogFormat:
     """A format whose files hold several streams."""
@@ -92,8 +85,8 @@ LOGS: tuple[LogFormat, ...] = (
     LogFormat("ros1-bag", "ROS 1 bag", _begins(b"#ROSBAG V2"), "ros_bag", "rosbags", "ros"),
     LogFormat("ros2-sqlite", "ROS 2 bag (SQLite)", _is_ros2_sqlite, "ros_bag", "rosbags", "ros"),
     LogFormat("mcap", "MCAP of ROS 2", _is_mcap, "ros_bag", "rosbags", "ros"),
-    LogFormat("ubx", "u-blox UBX", _has_ubx, "ublox", "pyubx2", "ubx"),
-    LogFormat("nmea", "NMEA 0183", _has_nmea, "nmea_log", "", ""),
+    LogFormat("ubx", "u-blox UBX", ublox.fits, "ublox", "pyubx2", "ubx"),
+    LogFormat("nmea", "NMEA 0183", nmea_log.fits, "nmea_log", "", ""),
     LogFormat("xsens-mt", "Xsens MT Manager text", xsens_mt.fits, "xsens_mt", "", ""),
     LogFormat("vectornav", "VectorNav CSV", vectornav.fits, "vectornav", "", ""),
     LogFormat("microstrain", "MicroStrain MIP Monitor CSV", microstrain.fits, "microstrain", "", ""),

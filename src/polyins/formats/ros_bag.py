@@ -21,7 +21,8 @@ from polyins.errors import InputError
 from polyins.files import find, read_head
 from polyins.formats import ros_fields
 from polyins.formats.bundle import is_bundle
-from polyins.formats.log import Clock, Log, damage_named, needed
+from polyins.formats.library import damage_named, needed
+from polyins.formats.log import Clock, Log
 from polyins.formats.ros_streams import (
     FIX,
     IMU,

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from polyins.formats import ros_fields
-from polyins.formats.log import counted, joined_rates, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import joined_rates, rates_to_rows
+from polyins.formats.log import counted
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -88,8 +89,7 @@ class Streams:
             self.notes.append(
                 f"{topic}: taken as {units}; nothing tells how good they are, nor what heights count from"
             )
-            kept = np.flatnonzero(np.isfinite(places).all(axis=1) & places[:, :2].any(axis=1))
-            kept = kept[rising(time[kept])]
+            kept = rising(time, np.isfinite(places).all(axis=1) & places[:, :2].any(axis=1))
             self._add_track(topic, Track(source, time[kept], places[kept]))
         elif of.kind == ODOMETRY:
             self.sensors[topic] = _speed(source, time, table)
@@ -199,8 +199,7 @@ def _heading(quaternion: Array) -> Array:
 
 
 def _track(source: RowSource, time: Array, values: Array) -> Track:
-    fixed = np.flatnonzero((values[:, 9] >= 0.0) & np.isfinite(values[:, 2:5]).all(axis=1))
-    kept = fixed[rising(time[fixed])]
+    kept = rising(time, (values[:, 9] >= 0.0) & np.isfinite(values[:, 2:5]).all(axis=1))
     std = np.sqrt(np.maximum(values[kept, 5:8], 0.0))
     told = bool((values[kept, 8] != NO_COVARIANCE).all()) and bool((std > 0.0).all())
     return Track(
@@ -220,8 +219,7 @@ def _speed(source: RowSource, time: Array, values: Array) -> SensorRows:
 
 def _pressure_height(source: RowSource, time: Array, values: Array) -> SensorRows:
     """Return heights in the standard atmosphere: right but for an offset that goes with the weather."""
-    kept = np.flatnonzero(values[:, 2] > 0.0)
-    kept = kept[rising(time[kept])]
+    kept = rising(time, values[:, 2] > 0.0)
     ratio = values[kept, 2] / PRESSURE_PA
     height = HEIGHT_M * (1.0 - ratio**EXPONENT)
     per_pascal = HEIGHT_M * EXPONENT * ratio ** (EXPONENT - 1.0) / PRESSURE_PA

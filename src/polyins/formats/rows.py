@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from polyins.model.recording import USUAL_OF, Array
 from polyins.prepare.timesync import GAP
@@ -153,3 +153,11 @@ def intervals(time: Array) -> Array:
     known = steps[:USUAL_OF][steps[:USUAL_OF] > 0.0]
     usual = float(np.median(known)) if len(known) else 0.0
     return np.concatenate([[usual], np.where((steps > 0.0) & (steps <= GAP * usual), steps, usual)])
+
+
+def rising(time: Array, among: ArrayLike | None = None) -> NDArray[np.intp]:
+    """Return the rows whose stamp is above all before it, of those for which `among`, shape (T,), is true."""
+    rows = np.arange(len(time)) if among is None else np.flatnonzero(among)
+    stamps = time[rows]
+    before = np.concatenate([[-np.inf], np.maximum.accumulate(stamps)[:-1]])
+    return rows[stamps > before]

@@ -16,8 +16,8 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_head, read_text
-from polyins.formats.gps_time import GPS_EPOCH, WEEK_S, leap_seconds, utc_of_week
 from polyins.formats.rows import RowSource, Track
+from polyins.model.gps_time import GPS_EPOCH, WEEK_S, leap_seconds, utc_of_week
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
 from polyins.formats.bundle import LISTING, Bundle, is_bundle
-from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
 from polyins.formats.text_rows import TextRows, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -111,8 +112,7 @@ def _track(path: Path, name: str, rows: TextRows, speeds: TextRows | None) -> Tr
     rows = rows.whole("timestamp", *PLACE)
     time, std = rows.columns["timestamp"], _all(rows, PLACE_STD)
     known = (rows.of(*PLACE[:2]) != 0.0).any(axis=1) & (std > 0.0).all(axis=1)
-    good = np.flatnonzero(known)
-    kept = good[rising(time[good])]
+    kept = rising(time, known)
     if not len(kept):
         return None
     place, above = rows.of(*PLACE)[kept], _all(rows, ("undulation",))[kept, 0]

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.formats.columns import OpenTable
+from polyins.model.gps_time import DAY_S
 from polyins.model.recording import Array
 
 if TYPE_CHECKING:
     from polyins.config import FineTime, TimeColumn
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-DAY_S = 86400.0
 WRAPPED = 0.5
 """of its range a counter goes back by when it starts again"""
 ZONE = re.compile(r"\s*(Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)$", re.IGNORECASE)

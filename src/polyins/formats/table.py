@@ -1,9 +1,8 @@
-"""Tables, CSV or Parquet, whose columns and units the configuration declares; and the tables that polyins writes."""
+"""Tables, CSV or Parquet, whose columns and units the configuration declares."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.errors import InputError
-from polyins.files import find, plain_suffix, write_bytes
-from polyins.formats.arrow_arrays import to_arrow
-from polyins.formats.columns import Column, OpenTable, column_names, is_parquet, open_table, read_columns
-from polyins.formats.log import rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, intervals
+from polyins.formats.column_place import Column
+from polyins.formats.columns import OpenTable, open_table
+from polyins.formats.joined import at_stamps
+from polyins.formats.rows import ImuRows, RowSource, Track, intervals, rising
 from polyins.formats.stamps import seconds_per_count, stamps
-from polyins.model.recording import Array, GnssStream, ImuStream
+from polyins.formats.written_table import ABOVE_SEA_NAMES, written_columns, written_imu_columns
+from polyins.model.recording import Array
 from polyins.model.rig import DEG, STANDARD_GRAVITY
-from polyins.prepare.timesync import GAP
 
 if TYPE_CHECKING:
     from polyins.config import AccelColumns, GyroColumns, ImuColumns, RowsOf, TimeColumn, TrackColumns
@@ -28,21 +26,6 @@ if TYPE_CHECKING:
 
 RADIANS = {"rad/s": 1.0, "rad": 1.0, "deg/s": DEG, "deg": DEG}
 METRES = {"m/s^2": 1.0, "m/s": 1.0, "g": STANDARD_GRAVITY}
-
-IMU_NAMES = ("time_s", *(f"dtheta_{axis}_rad" for axis in "xyz"), *(f"dvel_{axis}_m_s" for axis in "xyz"))
-GEODETIC_NAMES = ("latitude_deg", "longitude_deg", "height_m")
-ABOVE_SEA_NAMES = (*GEODETIC_NAMES[:2], "height_above_sea_m")
-LOCAL_NAMES = ("north_m", "east_m", "down_m")
-STD_NAMES = ("std_north_m", "std_east_m", "std_down_m")
-VELOCITY_NAMES = ("north_velocity_m_s", "east_velocity_m_s", "down_velocity_m_s")
-VELOCITY_STD_NAMES = ("std_north_velocity_m_s", "std_east_velocity_m_s", "std_down_velocity_m_s")
-ATTITUDE_NAMES = ("roll_deg", "pitch_deg", "heading_deg")
-SENSOR_NAMES = {"height": "height_m", "heading": "heading_deg", "odometer": "speed_m_s"}
-"""what sensors beside IMUs and GNSS show, by kind"""
-SHOWN_NAMES = {**SENSOR_NAMES, "speed": "speed_m_s", "ticks": "ticks"}
-"""and what else logs hold"""
-METADATA = b"polyins"
-"""of a Parquet file, a JSON document"""
 
 
 def read_imu(path: str | Path, columns: ImuColumns | None = None, rate_hz: float | None = None) -> ImuRows:
@@ -103,18 +86,14 @@ def _merged(table: OpenTable, columns: ImuColumns, time: TimeColumn) -> ImuRows:
         raise InputError(
             f"{other.path}: {len(known)} row(s) of the accelerometer, {len(at)} of the gyro; expected more"
         )
-    near = np.searchsorted(known, at)
-    longest = GAP * float(np.median(np.diff(known)))
-    inside = (near > 0) & (near < len(known))
-    inside[inside] = (known[near[inside]] - known[near[inside] - 1]) <= longest
+    force, inside = at_stamps(known, force, at)
     if not inside.any():
         raise InputError(
             f"{other.path}: the accelerometer covers {known[0]:.3f} to {known[-1]:.3f} s, the gyro {at[0]:.3f} to "
             f"{at[-1]:.3f} s; expected the same clock"
         )
-    force = np.column_stack([np.interp(at[inside], known, axis) for axis in force.T])
     kept = np.flatnonzero(inside)
-    values = [*rates[kept].T, *force.T]
+    values = [*rates[kept].T, *force[kept].T]
     plain = columns.model_copy(update={"gyro": _unscaled(columns.gyro), "accel": _unscaled(accel)})
     rows = _imu_rows(source.at(kept), values, plain, at[kept])
     return replace(rows, warnings=tuple(dict.fromkeys((*rows.warnings, *other.source.warnings))))
@@ -135,15 +114,6 @@ def _series(
     kept = kept[there[kept]]
     kept = kept[rising(at[kept])]
     return table.source.at(kept), at[kept], values[kept]
-
-
-def written_imu_columns() -> ImuColumns:
-    """Return the columns of an IMU table that polyins wrote."""
-    from polyins.config import ImuColumns
-
-    gyro = {"names": IMU_NAMES[1:4], "unit": "rad"}
-    accel = {"names": IMU_NAMES[4:7], "unit": "m/s"}
-    return ImuColumns.model_validate({"time": {"name": IMU_NAMES[0]}, "gyro": gyro, "accel": accel})
 
 
 def imu_cells(columns: ImuColumns, rate_hz: float | None = None) -> list[Column]:
@@ -250,93 +220,6 @@ def _changes(position: Array) -> NDArray[np.intp]:
     return there[moved]
 
 
-def written_columns(path: str | Path) -> TrackColumns:
-    """Return the columns of a table of positions that polyins wrote."""
-    from polyins.config import TrackColumns
-
-    names = set(column_names(path))
-    known = next((some for some in (GEODETIC_NAMES, ABOVE_SEA_NAMES) if names.issuperset(some)), None)
-    geodetic = known is not None and not np.isnan(read_columns(path, GEODETIC_NAMES[:1])[1][0]).all()
-    declared: dict[str, object] = {
-        "time": {"name": "time_s"},
-        "position": {"names": known if geodetic else LOCAL_NAMES} | ({} if geodetic else {"frame": "north-east-down"}),
-    }
-    for group, columns in (
-        ("std", STD_NAMES),
-        ("velocity", VELOCITY_NAMES),
-        ("velocity_std", VELOCITY_STD_NAMES),
-        ("attitude", ATTITUDE_NAMES),
-    ):
-        if names.issuperset(columns):
-            declared[group] = {"names": columns}
-    return TrackColumns.model_validate(declared)
-
-
-def is_written_track(names: Iterable[str]) -> bool:
-    """Whether a table with these columns is one of positions that polyins wrote."""
-    found = set(names)
-    return "time_s" in found and any(map(found.issuperset, (GEODETIC_NAMES, ABOVE_SEA_NAMES, LOCAL_NAMES)))
-
-
-def utc_of_zero(path: str | Path) -> float | None:
-    """Return the Unix time at which the stamps of a Parquet file are zero, s, if polyins wrote it and knew."""
-    from pyarrow import ArrowException, parquet
-
-    if not is_parquet(path):
-        return None
-    try:
-        metadata = parquet.read_metadata(find(path)).metadata or {}
-    except (ArrowException, OSError):  # packed, or damaged, which its reader says
-        return None
-    known: float | None = json.loads(metadata.get(METADATA, b"{}")).get("utc_of_zero_s")
-    return known
-
-
-def write_imu(path: str | Path, stream: ImuStream, utc_of_zero: float | None = None) -> None:
-    """Write increments as CSV or Parquet, by the suffix; `utc_of_zero`: see the function, s."""
-    _write(path, IMU_NAMES, [stream.time, stream.dtheta, stream.dvel], utc_of_zero)
-
-
-def write_sensor(path: str | Path, rows: SensorRows, utc_of_zero: float | None = None) -> None:
-    """Write what a sensor shows, and its std where there is one, as CSV or Parquet."""
-    name, unit = SHOWN_NAMES[rows.kind], DEG if rows.kind == "heading" else 1.0
-    given = {name: rows.value, f"std_{name}": rows.std}
-    known = {column: values / unit for column, values in given.items() if values is not None}
-    _write(path, ("time_s", *known), [rows.time, *known.values()], utc_of_zero)
-
-
-def write_gnss(path: str | Path, stream: GnssStream, *, geodetic: bool) -> None:
-    """Write fixes with their standard deviations as CSV or Parquet, by the suffix."""
-    track = Track(
-        RowSource(str(path)),
-        stream.time,
-        stream.position,
-        geodetic,
-        position_std=stream.position_std,
-        velocity=stream.velocity,
-        velocity_std=stream.velocity_std,
-    )
-    write_track(path, track)
-
-
-def write_track(path: str | Path, track: Track, utc_of_zero: float | None = None) -> None:
-    """Write positions, and what else there is with them, as CSV or Parquet, by the suffix."""
-    units = np.array([DEG, DEG, 1.0] if track.geodetic else [1.0, 1.0, -1.0])
-    geodetic = ABOVE_SEA_NAMES if track.above_sea else GEODETIC_NAMES
-    names = ["time_s", *(geodetic if track.geodetic else LOCAL_NAMES)]
-    values = [track.time, track.position / units]
-    for extra, block, unit in (
-        (STD_NAMES, track.position_std, 1.0),
-        (VELOCITY_NAMES, track.velocity, 1.0),
-        (VELOCITY_STD_NAMES, track.velocity_std, 1.0),
-        (ATTITUDE_NAMES, track.attitude, DEG),
-    ):
-        if block is not None:
-            names += extra
-            values.append(block / unit)
-    _write(path, names, values, utc_of_zero)
-
-
 def _track(source: RowSource, time: Array, found: dict[str, Array], columns: TrackColumns) -> Track:
     frame = columns.position.frame
     geodetic = frame == "latitude-longitude-height"
@@ -367,20 +250,3 @@ def _north_east_up(values: Array, frame: str) -> Array:
 def _north_east_first(values: Array, frame: str) -> Array:
     """Bring three magnitudes given in `frame` into the order north, east, vertical."""
     return values[:, [1, 0, 2]] if frame == "east-north-up" else values
-
-
-def _write(path: str | Path, names: Sequence[str], values: Sequence[Array], utc_of_zero: float | None = None) -> None:
-    from pyarrow import BufferOutputStream, csv, parquet
-    from pyarrow import table as arrow_table
-
-    rows = np.column_stack(values)
-    table = arrow_table({name: to_arrow(rows[:, n]) for n, name in enumerate(names)})
-    if utc_of_zero is not None:
-        table = table.replace_schema_metadata({METADATA: json.dumps({"utc_of_zero_s": utc_of_zero})})
-    content = BufferOutputStream()
-    if plain_suffix(path) == ".parquet":
-        # numbers that never repeat gain nothing from a dictionary, but from keeping their like bytes together
-        parquet.write_table(table, content, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
-    else:
-        csv.write_csv(table, content)
-    write_bytes(path, content.getvalue().to_pybytes())

@@ -11,6 +11,8 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.formats.arrow_arrays import to_numpy
+from polyins.formats.layout import Dialect, offset_of_line
+from polyins.formats.text_table import csv_columns
 from polyins.model.recording import Array
 
 NOTHING = ("", "nan", "NaN", "NAN", "null", "N/A", "-nan", "-nan(ind)")
@@ -49,7 +51,7 @@ class TextRows:
 
 def lines_before(content: bytes, line: int) -> list[str]:
     """Return the first lines, with that of the number given, counted from 0, as the last."""
-    return content[: _offset(content, line + 1)].decode("utf-8-sig", errors="replace").splitlines()
+    return content[: offset_of_line(content, line + 1)].decode("utf-8-sig", errors="replace").splitlines()
 
 
 def header_line(content: bytes, pattern: str) -> int | None:
@@ -66,13 +68,13 @@ def read_rows(
     A last line that is cut off is left out, with a warning. `unit_lines`: of units between header and rows. Raises
     InputError that names the line of a cell that is no number, or of a row with other columns than the header's.
     """
-    begin = _offset(content, header)
+    begin = offset_of_line(content, header)
     end = content.find(b"\n", begin)
     line = content[begin : end if end >= 0 else len(content)].decode("utf-8-sig", errors="replace")
     names = [name.strip().strip('"').strip() for name in line.split(delimiter)]
     places = {name: names.index(name) for name in names if name and re.fullmatch(wanted, name)}
     first = header + 1 + unit_lines
-    rows = content[_offset(content, first) : _end(content)]
+    rows = content[offset_of_line(content, first) : _end(content)]
     if not rows:
         return TextRows({name: np.zeros(0) for name in places}, first + 1)
     end = rows.find(b"\n")
@@ -109,27 +111,14 @@ def _columns(rows: bytes, delimiter: str, count: int, places: dict[str, int]) ->
 
 def _parsed(rows: bytes, delimiter: str, count: int, places: Sequence[int], kind: Any) -> tuple[list[Any], list[Bad]]:
     """Return columns by their numbers, since a file may repeat names, and the rows with other columns, from 0."""
-    from pyarrow import BufferReader, csv
-
     bad: list[Bad] = []
 
     def skip(row: Any) -> str:
         bad.append((row.number - 1, f"{row.actual_columns} columns; expected {row.expected_columns}"))
         return "skip"
 
-    keys = [str(at) for at in places]
-    table = csv.read_csv(
-        BufferReader(rows if rows.isascii() else rows.decode(errors="replace").encode()),
-        csv.ReadOptions(column_names=[str(at) for at in range(count)], use_threads=False),
-        csv.ParseOptions(delimiter=delimiter, invalid_row_handler=skip),
-        csv.ConvertOptions(
-            include_columns=keys,
-            column_types=dict.fromkeys(keys, kind),
-            null_values=list(NOTHING),
-            strings_can_be_null=True,
-        ),
-    )
-    return [table[key] for key in keys], bad
+    text = rows if rows.isascii() else rows.decode(errors="replace").encode()
+    return csv_columns(text, Dialect(delimiter, ("",) * count, 1), places, kind, skip, NOTHING), bad
 
 
 def _numbers(cells: Any, name: str) -> tuple[Array, list[Bad]]:
@@ -137,7 +126,7 @@ def _numbers(cells: Any, name: str) -> tuple[Array, list[Bad]]:
     values, bad = np.full(len(cells), np.nan), []
     for row, text in enumerate(cells.to_pylist()):
         try:
-            values[row] = float(text) if text else np.nan
+            values[row] = np.nan if text in NOTHING else float(text)
         except ValueError:
             bad.append((row, f"{name} is {text!r}; expected a number"))
     return values, bad
@@ -149,13 +138,3 @@ def _end(content: bytes) -> int:
     while end and content[end - 1 : end].isspace():
         end -= 1
     return end
-
-
-def _offset(content: bytes, line: int) -> int:
-    """Return where a line begins, counted from 0."""
-    at = 0
-    for _ in range(line):
-        at = content.find(b"\n", at) + 1
-        if at == 0:
-            return len(content)
-    return at

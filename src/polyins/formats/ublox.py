@@ -17,9 +17,10 @@ import numpy as np
 
 from polyins.files import find, read_bytes
 from polyins.formats import nmea_log, ublox_sensors
-from polyins.formats.gps_time import GPS_EPOCH, WEEK_S, utc_of_week
-from polyins.formats.log import Log, counted, damage_named, needed, rising
-from polyins.formats.rows import RowSource, SensorRows, Track
+from polyins.formats.library import damage_named, needed
+from polyins.formats.log import Log, counted
+from polyins.formats.rows import RowSource, SensorRows, Track, rising
+from polyins.model.gps_time import GPS_EPOCH, WEEK_S, utc_of_week
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -56,6 +57,11 @@ _TIME_AT = {
 }  # fmt: skip
 """where iTOW stands in the messages that are looked at"""
 _SENSED = {(0x10, 0x02): "ESF-MEAS", (0x10, 0x03): "ESF-RAW", (0x10, 0x15): "ESF-INS"}
+
+
+def fits(head: bytes) -> bool:
+    """Whether there is a whole message, by its checksum."""
+    return next(_frames(head), None) is not None
 
 
 def read(path: str | Path) -> Log:
@@ -149,8 +155,7 @@ def _track(source: RowSource, messages: Messages, time: Array, fixed_name: str) 
     rapid = hasattr(messages[0], "gpsFix")
     kinds, good = _of(messages, "gpsFix" if rapid else "fixType", fixed_name).T
     carrier = np.zeros(len(kinds)) if rapid else _of(messages, "carrSoln")[:, 0]
-    fixed = np.flatnonzero(np.isin(kinds, THREE_DIMENSIONS) & (good == 1.0))
-    kept = fixed[rising(time[fixed])]
+    kept = rising(time, np.isin(kinds, THREE_DIMENSIONS) & (good == 1.0))
     horizontal, vertical, speed = _of(messages, "hAcc", "vAcc", "sAcc")[kept].T * 1e-3
     names = [
         CARRIER.get(int(phase), FIXES.get(int(kind), f"type {kind:g}"))
@@ -200,8 +205,7 @@ def _headings(path: Path, messages: dict[str, list[Any]], times: dict[str, list[
         good = (std > 0.0) & (std < LARGEST_HEADING_STD)
         if valid_name:
             good &= _of(messages[kind], valid_name)[:, 0] == 1.0
-        kept = np.flatnonzero(good)
-        kept = kept[rising(time[kept])]
+        kept = rising(time, good)
         if len(kept):
             source = RowSource(f"{path}, {kind}")
             found[kind] = SensorRows(source, "heading", time[kept], heading[kept], std[kept])

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.formats.log import joined_rates, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import joined_rates
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
-from polyins.formats.gps_time import WEEK_S, utc_of_week
-from polyins.formats.log import Log, counted, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log, counted
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, Track, rising
+from polyins.formats.stamps import unwrapped
 from polyins.formats.text_rows import TextRows, header_line, read_rows
+from polyins.model.gps_time import WEEK_S, utc_of_week
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 
@@ -53,7 +55,7 @@ def read(path: str | Path) -> Log:
     rows = _named(found, read_rows(str(found), content, header_line(content, "GpsTow") or 0, ",", wanted=VALUES))
     if not rows.has("GpsTow"):
         raise InputError(f"{found}: no row has GpsTow; expected stamps")
-    time = _running_on(rows.columns["GpsTow"])
+    time = unwrapped(rows.columns["GpsTow"], WEEK_S)
     rows = TextRows({**rows.columns, "GpsTow": time}, rows.first_line, rows.warnings)
     imus = {name: imu for name, columns in IMUS.items() if (imu := _imu(found, name, rows, *columns))}
     ages: list[str] = []
@@ -91,12 +93,6 @@ def _named(path: Path, rows: TextRows) -> TextRows:
     return TextRows(columns, rows.first_line, rows.warnings)
 
 
-def _running_on(second: Array) -> Array:
-    """Return seconds of the week that run on over its end."""
-    steps = np.nan_to_num(np.diff(second))
-    return np.asarray(second + np.concatenate([[0.0], np.cumsum(steps < -0.5 * WEEK_S)]) * WEEK_S)
-
-
 def _imu(path: Path, name: str, rows: TextRows, gyro: str, force: str) -> ImuRows | None:
     rates, forces = ([f"{one}::{axis}" for axis in "XYZ"] for one in (gyro, force))
     if not rows.has(*rates, *forces):
@@ -124,8 +120,7 @@ def _track(path: Path, name: str, rows: TextRows, ages: list[str]) -> Track | No
         quality = counted(kind[np.isfinite(kind)], lambda fix: FIXES.get(int(fix), f"type {fix:g}"))
     else:
         quality = {}
-    good = np.flatnonzero(known)
-    kept = good[rising(time[good])]
+    kept = rising(time, known)
     velocity = _known(rows, kept, [f"{name}::VelNed::{axis}" for axis in "NED"])
     speed = _known(rows, kept, 3 * [f"{name}::VelU"], positive=True)
     return Track(

@@ -15,8 +15,9 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import find, read_bytes
-from polyins.formats.log import Log, rates_to_rows, rising
-from polyins.formats.rows import ImuRows, RowSource, SensorRows
+from polyins.formats.joined import rates_to_rows
+from polyins.formats.log import Log
+from polyins.formats.rows import ImuRows, RowSource, SensorRows, rising
 from polyins.formats.text_rows import TextRows, header_line, lines_before, read_rows
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
@@ -144,8 +145,7 @@ def _heading(path: Path, rows: TextRows, time: Array, frame: str | None) -> tupl
     if frame not in EAST_NORTH:
         return {}, ["orientation is not read: the header does not tell its frame (Coordinate system: ENU, NED, NWU)"]
     east, north = np.array(EAST_NORTH[frame]) @ pointing.T
-    known = np.flatnonzero(np.isfinite(pointing).all(axis=1))
-    kept = known[rising(time[known])]
+    kept = rising(time, np.isfinite(pointing).all(axis=1))
     source = RowSource(f"{path}, orientation")
     heading = SensorRows(source, "heading", time[kept], np.arctan2(east, north)[kept])
     return {"orientation": heading}, ["orientation: of the sensor's x axis; its north is magnetic, or arbitrary"]

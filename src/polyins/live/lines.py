@@ -15,12 +15,12 @@ are in the sensor's axes. A line may end in `*` and two hexadecimal digits: the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial, reduce
+from functools import partial
 from math import isfinite
-from operator import xor
 
 import numpy as np
 
+from polyins.formats.nmea import checksum
 from polyins.live.source import RefusedError
 from polyins.model.rig import DEG
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
@@ -69,11 +69,6 @@ def write(sample: Sample) -> str:
 
 def _joined(kind: str, *fields: str | float) -> str:
     return ",".join([MAGIC, kind, *(one if isinstance(one, str) else repr(float(one)) for one in fields)])
-
-
-def checksum(line: bytes) -> int:
-    """Return the exclusive or of all bytes."""
-    return reduce(xor, line, 0)
 
 
 def _without_checksum(line: bytes) -> bytes:

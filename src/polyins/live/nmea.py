@@ -7,13 +7,10 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-from polyins.live.lines import checksum
+from polyins.formats.nmea import KNOT, checksum
+from polyins.model.gps_time import DAY_S, EARLIEST_UNIX_S
 from polyins.model.status import ATTITUDE_ONLY, NOT_TO_BE_USED, STATUSES
 
-UNIX_TIME = 1e9
-"""Stamps above this are seconds of Unix time; below, only their time of day is known."""
-DAY = 86400.0
-KNOT = 1852.0 / 3600.0
 INVALID, FIX, ESTIMATED = 0, 1, 6
 """GGA quality"""
 LOST = (STATUSES[ATTITUDE_ONLY], STATUSES[NOT_TO_BE_USED])
@@ -68,11 +65,11 @@ def _turned(angle: float) -> str:
 
 def _time_and_date(stamp: float) -> tuple[str, str]:
     stamp = round(stamp, 2)
-    if stamp >= UNIX_TIME:
+    if stamp >= EARLIEST_UNIX_S:
         at = datetime.fromtimestamp(stamp, UTC)
         return f"{at:%H%M%S}.{at.microsecond // 10000:02d}", f"{at:%d%m%y}"
-    hundredths = round(stamp % DAY * 100)
-    minutes, rest = divmod(hundredths % int(DAY * 100), 6000)
+    hundredths = round(stamp % DAY_S * 100)
+    minutes, rest = divmod(hundredths % int(DAY_S * 100), 6000)
     return f"{minutes // 60:02d}{minutes % 60:02d}{rest // 100:02d}.{rest % 100:02d}", ""
 
 

@@ -91,8 +91,9 @@ def run(options: Options) -> dict[str, Any]:
 
     Raises InputError for a configuration, source or sink that cannot be right, and for data that end without a start.
     """
-    config, document, warnings = loading.read_config(options.config)
-    recording, said = _recording(options, config, document)
+    settings = loading.read_config(options.config)
+    config = settings.config
+    recording, said = _recording(options, config, settings.document)
     method = find_method(options.method or choice.usual_method(recording.rig)).name
     make_folder(options.out)
     session = _session(options, config, recording, method)
@@ -100,7 +101,7 @@ def run(options: Options) -> dict[str, Any]:
         live = Live(session, _sources(options, config, recording, session), stopped)
         live.open_outlets(options, method, config)
         live.run()
-    summary = live.summary(method, (*warnings, *said))
+    summary = live.summary(method, (*settings.warnings, *said))
     write_document(options.out / "summary.json", summary)
     if session.navigator is None and not live.stopped_by:
         raise InputError(f"{options.config}: the data ended without a start: {session.starter.why}")

@@ -11,6 +11,7 @@ import numpy as np
 
 from polyins.model.findings import Finding
 from polyins.model.geodesy import displacement
+from polyins.model.gps_time import WEEK_S
 from polyins.model.recording import GnssStream, usual_interval
 
 STREAM = "GNSS position"
@@ -26,7 +27,6 @@ LEAST_HEIGHT = 5.0
 """m: lower ones tell no unit"""
 NEAR_ZERO, FAR_FROM_ZERO = 1e-5, 1e-3
 """rad: latitudes and longitudes of a receiver without a fix, and those that are so by no chance"""
-WEEK_S = 604800.0
 GONE_S, GONE_INTERVALS = 10.0, 5.0
 """s, and times the usual interval: a longer time without fixes is an outage"""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from polyins.config import Config, GnssEntry, ImuEntry
 from polyins.config.yaml_document import Document
-from polyins.formats import rtklib, table
+from polyins.formats import rtklib, written_table
 from polyins.formats.columns import is_parquet
 from polyins.formats.recognize import log_format, read_log
 from polyins.model.recording import ImuStream, Offset
@@ -113,7 +113,7 @@ def _utc_of_zero(entry: ImuEntry | GnssEntry) -> float | None:
     if entry.format == "auto" and log_format(entry.file) is not None:
         utc = read_log(entry.file).utc_of_zero
     elif is_parquet(entry.file):
-        utc = table.utc_of_zero(entry.file)
+        utc = written_table.utc_of_zero(entry.file)
     elif isinstance(entry, GnssEntry) and entry.format in ("auto", "rtklib-pos"):
         utc = rtklib.utc_of_zero(entry.file)
     else:

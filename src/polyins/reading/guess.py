@@ -10,12 +10,13 @@ from typing import Any
 
 from polyins.errors import InputError
 from polyins.files import find
-from polyins.formats import kf_gins, rtklib, table, xsens_dot
+from polyins.formats import kf_gins, rtklib, table, written_table, xsens_dot
 from polyins.formats.columns import open_table
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, Track
-from polyins.reading import table_streams, unnamed_columns
-from polyins.reading.table_streams import HalfImu, TableStream
+from polyins.reading import named_columns, unnamed_columns
+from polyins.reading.half_imu import HalfImu
+from polyins.reading.table_stream import TableStream
 
 Stream = ImuRows | Track
 
@@ -72,10 +73,10 @@ def read_table(path: str | Path) -> list[TableStream] | HalfImu:
     opened = open_table(path)
     opened.parse_numbers()
     names = set(opened.names)
-    if names.issuperset(table.IMU_NAMES):
-        return [TableStream(table.imu_of(opened, table.written_imu_columns()), None, ())]
-    if table.is_written_track(names):
-        return [TableStream(table.read_track(path), None, ())]
+    if names.issuperset(written_table.IMU_NAMES):
+        return [TableStream(table.imu_of(opened, written_table.written_imu_columns()))]
+    if written_table.is_written_track(names):
+        return [TableStream(table.read_track(path))]
     if not any(names):
         return unnamed_columns.streams_of(opened)
-    return table_streams.streams_of(opened)
+    return named_columns.streams_of(opened)

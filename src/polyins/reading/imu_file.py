@@ -11,8 +11,8 @@ import numpy as np
 from polyins.checks.no_data import AFTER, LEAP
 from polyins.config import ImuColumns, ImuEntry
 from polyins.files import find
-from polyins.formats import columns, kf_gins, table
-from polyins.formats.columns import Column
+from polyins.formats import columns, kf_gins, table, written_table
+from polyins.formats.column_place import Column
 from polyins.formats.recognize import imu_format
 from polyins.formats.rows import ImuRows, RowSource
 from polyins.formats.stamps import seconds_per_count
@@ -146,7 +146,7 @@ def _kind(entry: ImuEntry) -> str:
 
 def _format(entry: ImuEntry) -> tuple[ImuColumns, Pieces]:
     if _kind(entry) == "table":
-        return entry.columns or table.written_imu_columns(), columns.read_in_order
+        return entry.columns or written_table.written_imu_columns(), columns.read_in_order
     return kf_gins.columns_of(entry.file, rates=_kind(entry) == "wheel-ins"), kf_gins.read_in_order
 
 

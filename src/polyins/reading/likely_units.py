@@ -13,6 +13,7 @@ import numpy as np
 from polyins.formats.stamps import SECONDS
 from polyins.model.recording import Array
 from polyins.model.rig import DEG, STANDARD_GRAVITY
+from polyins.reading.doubts import Doubt
 
 LIKELY_RATES_HZ = (10.0, 5000.0)
 SLOWEST_FIX_HZ = 0.02
@@ -47,7 +48,7 @@ class Likely:
 
     unit: str
     scale: float = 1.0
-    doubt: str = ""
+    doubt: Doubt | None = None
 
 
 def time_unit(stamps: Array, rates: tuple[float, float] = LIKELY_RATES_HZ) -> str | None:
@@ -88,7 +89,9 @@ def _counted(sizes: Sequence[float]) -> Likely:
     size = float(np.nanmedian(sizes))
     per_g = min(COUNTS_OF_G, key=lambda count: abs(np.log(size / count)))
     unit, scale = ("g", 1.0 / per_g) if per_g != STANDARD_GRAVITY * 1000.0 else ("m/s^2", 1e-3)
-    return Likely(unit, scale, f"raw counts, {size:.0f} in the middle: the scale is a guess, see the data sheet")
+    return Likely(
+        unit, scale, Doubt(f"raw counts, {size:.0f} in the middle: the scale is a guess, see the data sheet", "units")
+    )
 
 
 def gyro_unit(rates: Array, force: Array, step: float, accel: Likely) -> Likely:
@@ -96,7 +99,8 @@ def gyro_unit(rates: Array, force: Array, step: float, accel: Likely) -> Likely:
     if accel.doubt:
         per_g = min(COUNTS_OF_G, key=lambda count: abs(np.log(count * accel.scale * _g(accel.unit))))
         per_deg_s = COUNTS_OF_G[per_g]
-        return Likely("deg/s", 1.0 / per_deg_s, "raw counts: the scale is a guess, which values do not tell")
+        untold = Doubt("raw counts: the scale is a guess, which values do not tell", "units")
+        return Likely("deg/s", 1.0 / per_deg_s, untold)
     increments = accel.unit == "m/s"
     ending = "" if increments else "/s"
     values = rates / step if increments and step > 0.0 else rates
@@ -107,7 +111,7 @@ def gyro_unit(rates: Array, force: Array, step: float, accel: Likely) -> Likely:
         return Likely("rad" + ending)
     ratio = turn_of_gravity(values, force, step)
     if ratio is None:
-        return Likely("rad" + ending, doubt="whether it is rad or deg is a guess: the unit is a guess")
+        return Likely("rad" + ending, doubt=Doubt("whether it is rad or deg is a guess: the unit is a guess", "units"))
     return Likely(("deg" if ratio < np.sqrt(DEG) else "rad") + ending)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_confi
 from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
+from polyins.model.findings import Finding
 from polyins.model.recording import FilterOptions, Heights, ImuStream, Offset, Recording
 from polyins.model.rig import Imu, Rig
 from polyins.reading import catalogue, clocks, usable
@@ -22,11 +23,20 @@ from polyins.reading.position_stream import read_gnss, read_reference
 from polyins.reading.sensor_stream import constraint_of, entries, read_sensors, sensors_of
 from polyins.reading.timing import outage_intervals, start_options
 
-Settings = tuple[Config, Document, tuple[str, ...]]
-"""a configuration, the document that says where its keys stand, and warnings"""
-
 NOT_IN_FORCE = {"dataset", "imu_defaults"}
 """keys that the others take in"""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A configuration that was read, or was made for logs."""
+
+    config: Config
+    """file names in it are absolute"""
+    document: Document
+    """says where its keys stand"""
+    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def load(path: str | Path) -> Recording:
@@ -40,16 +50,13 @@ def load(path: str | Path) -> Recording:
 
 def load_settings(settings: Settings) -> Recording:
     """Read the recording that a configuration describes which is read already; raises InputError as `load` does."""
-    config, document, warnings = settings
-    recording = build(config, document)
-    return replace(recording, warnings=(*warnings, *recording.warnings))
+    recording = build(settings.config, settings.document)
+    warnings = (*settings.warnings, *recording.warnings)
+    return replace(recording, warnings=warnings, findings=(*recording.findings, *settings.findings))
 
 
 def read_config(path: str | Path) -> Settings:
-    """Read a configuration file; file names in it come out absolute.
-
-    Returns the configuration, the document that says where its keys stand, and warnings.
-    """
+    """Read a configuration file."""
     document = read_yaml(path)
     warnings: tuple[str, ...] = ()
     for program in (wheel_ins_configuration, kf_gins_configuration):
@@ -57,7 +64,7 @@ def read_config(path: str | Path) -> Settings:
             values, warnings = program.translated(document)
             document = Document(document.path, values)
             break
-    return located(document), document, warnings
+    return Settings(located(document), document, warnings)
 
 
 def names_of(settings: Sequence[Settings]) -> list[str]:
@@ -65,9 +72,10 @@ def names_of(settings: Sequence[Settings]) -> list[str]:
 
     Raises InputError if two are still the same, or one cannot name a folder.
     """
-    own = [config.name for config, _, _ in settings]
+    own = [one.config.name for one in settings]
     names: dict[str, Path] = {}
-    for name, (_, document, _) in zip(own, settings, strict=True):
+    for name, one in zip(own, settings, strict=True):
+        document = one.document
         path = document.path.resolve()
         if Path(name).name != name:
             raise document.error(["name"], f"is {name!r}; expected what may be the name of a folder")

@@ -177,7 +177,7 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
     It can unless a clock offset is estimated, a gyro's range is given, or the format repairs rows by their neighbours.
     Raises InputError as `load` does.
     """
-    config, document, warnings = settings
+    config, document = settings.config, settings.document
     if not _can_be_streamed(config, document):
         return None
     if sum(_rows_at_most(entry.file) for entry in config.imus) < least_rows:
@@ -211,8 +211,8 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
         span, streams = _span(files, extents), tuple(streams[i] for i in kept)
     imus = tuple(as_mounted(entry) for entry in config.imus)
     head = loading.assemble(config, document, imus, streams, span)
-    warnings = (*warnings, *notes, *head.warnings)
-    findings = (*findings, *fallen)
+    warnings = (*settings.warnings, *notes, *head.warnings)
+    findings = (*findings, *fallen, *settings.findings)
     text = loading.in_force(known)
     return LongRecording(replace(head, warnings=warnings, findings=findings, config_text=text), files, extents, span)
 

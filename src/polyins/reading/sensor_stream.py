@@ -15,7 +15,7 @@ from polyins.files import find_named
 from polyins.formats.columns import column_names, open_table
 from polyins.formats.rows import SensorRows
 from polyins.formats.stamps import stamps
-from polyins.formats.table import SENSOR_NAMES
+from polyins.formats.written_table import SENSOR_NAMES
 from polyins.model.recording import AidingStream, Array, NonholonomicOptions
 from polyins.model.rig import DEG, AidingSensor
 from polyins.reading.log_streams import is_log, sensor_of

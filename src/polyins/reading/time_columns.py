@@ -18,6 +18,7 @@ from polyins.model.recording import Array
 from polyins.reading import column_names as said
 from polyins.reading import likely_units as likely
 from polyins.reading.column_names import named, parsed, sensor_axis
+from polyins.reading.doubts import Doubt
 
 RANGES = (604800.0, 604800e3, 2.0**16, 2.0**24, 2.0**31, 2.0**32, 2.0**31 / 1000, 2.0**32 / 1000, 60.0, 3600.0, 1e9)
 """counts at which counters start again; those of seconds with fractions among them"""
@@ -34,7 +35,7 @@ class TimeGuess:
     column: dict[str, Any]
     seconds: Array
     """shape (T,)"""
-    doubt: str = ""
+    doubt: Doubt | None = None
     counts: Array | None = field(default=None, compare=False)
     """of a single column whose unit no name says"""
 
@@ -79,7 +80,7 @@ def _unnamed(opened: OpenTable) -> TimeGuess | None:
         found = guessed(name, counts)
         steps = np.diff(found.seconds)
         if (steps > 0.0).all() and np.median(np.abs(steps - np.median(steps))) < 0.2 * np.median(steps):
-            return replace(found, doubt=f"the stamps are taken to be in {name}, which rises evenly")
+            return replace(found, doubt=Doubt(f"the stamps are taken to be in {name}, which rises evenly", "stamps"))
     return None
 
 
@@ -90,10 +91,11 @@ def guessed(name: str | int, counts: Array, rates: tuple[float, float] = likely.
     whole = counts if end is None else unwrapped(counts, end)
     stated = said.time_unit_of(name) if isinstance(name, str) else None
     unit = stated or likely.time_unit(whole, rates) or likely.time_unit(whole, RATES_HZ)
-    doubt = ""
+    doubt = None
     if stated is not None and not _likely(whole, stated):
         other = likely.time_unit(whole, likely.LIKELY_RATES_HZ)
-        doubt = f"stamps of {name} make an unlikely rate in {stated}" + (f"; is it {other}?" if other else "")
+        text = f"stamps of {name} make an unlikely rate in {stated}" + (f"; is it {other}?" if other else "")
+        doubt = Doubt(text, "stamps")
     column["unit"] = unit or "s"
     if end is not None:
         column["wraps_at"] = end

@@ -15,8 +15,11 @@ from polyins.formats.columns import OpenTable
 from polyins.model.recording import Array
 from polyins.model.rig import STANDARD_GRAVITY
 from polyins.reading import likely_units as likely
+from polyins.reading.doubts import Doubt
 from polyins.reading.likely_units import Likely
-from polyins.reading.table_streams import TableStream, described
+from polyins.reading.sensor_columns import scaled
+from polyins.reading.table_imus import described
+from polyins.reading.table_stream import TableStream
 from polyins.reading.time_columns import TimeGuess, guessed
 
 MOST_SENSORS = 64
@@ -29,7 +32,7 @@ UNLIKE = 0.2
 """against the logarithm of how the noise of three axes differs"""
 CENTRED = 300.0
 """times the spread of turn rates their mean may be"""
-NO_HEADER = "without a header, the columns are told by their values"
+NO_HEADER = Doubt("without a header, the columns are told by their values", "columns")
 
 
 def streams_of(opened: OpenTable) -> list[TableStream]:
@@ -51,12 +54,9 @@ def streams_of(opened: OpenTable) -> list[TableStream]:
     for number, rows in enumerate(groups):
         declared: dict[str, Any] = {
             "time": time.guess.of_rows(rows).column,
-            "gyro": {"names": [n + 1 for n in gyro], "unit": turning.unit, "scale": turning.scale},
-            "accel": {"names": [n + 1 for n in accel], "unit": force.unit, "scale": force.scale},
+            "gyro": {"names": [n + 1 for n in gyro], "unit": turning.unit} | scaled(turning),
+            "accel": {"names": [n + 1 for n in accel], "unit": force.unit} | scaled(force),
         }
-        for unit, key in ((turning, "gyro"), (force, "accel")):
-            if unit.scale == 1.0:
-                del declared[key]["scale"]
         if apart is not None:
             declared["only"] = {"name": apart[0] + 1, "equal": apart[1][number][0]}
         found.append(described(opened, declared, [NO_HEADER, time.guess.doubt, force.doubt, turning.doubt]))

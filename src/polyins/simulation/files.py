@@ -16,7 +16,7 @@ from polyins.config import Filter, HeadingEntry, HeightEntry, ImuEntry, Odometer
 from polyins.config.units import write as write_section
 from polyins.config.yaml_document import write_yaml
 from polyins.files import whole, write_bytes
-from polyins.formats.table import (
+from polyins.formats.written_table import (
     ATTITUDE_NAMES,
     GEODETIC_NAMES,
     LOCAL_NAMES,

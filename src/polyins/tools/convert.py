@@ -10,7 +10,7 @@ from pathlib import Path
 from polyins.checks import stream_checks
 from polyins.errors import InputError
 from polyins.files import find, new_file, plain_suffix, whole_folder
-from polyins.formats import kf_gins, table
+from polyins.formats import kf_gins, written_table
 from polyins.formats.log import Log
 from polyins.formats.recognize import log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
@@ -86,7 +86,7 @@ def _write_one(
             raise InputError(
                 f"{target}: what a sensor of {rows.kind} shows has no such format; expected .csv, .parquet"
             )
-        table.write_sensor(target, rows, utc_of_zero)
+        written_table.write_sensor(target, rows, utc_of_zero)
         return warnings
     warnings = (*warnings, *_check(rows))
     write: Callable[..., None] = _write_imu if isinstance(rows, ImuRows) else _write_track
@@ -106,7 +106,7 @@ def _write_imu(target: Path, rows: ImuRows, utc_of_zero: float | None) -> None:
     if (write := writers.get(plain_suffix(target))) is not None:
         write(target, stream)
     else:
-        table.write_imu(target, stream, utc_of_zero)
+        written_table.write_imu(target, stream, utc_of_zero)
 
 
 def _write_track(target: Path, track: Track, utc_of_zero: float | None) -> None:
@@ -114,7 +114,7 @@ def _write_track(target: Path, track: Track, utc_of_zero: float | None) -> None:
     if suffix == ".bin":
         raise InputError(f"{target}: positions have no binary format; expected {SUFFIXES}")
     if suffix in TABLES:
-        table.write_track(target, track, utc_of_zero)
+        written_table.write_track(target, track, utc_of_zero)
         return
     if track.above_sea:
         raise InputError(f"{track.source.path}: heights are above the sea, KF-GINS has ellipsoidal ones; expected .csv")

@@ -18,7 +18,8 @@ from polyins.formats.rows import ImuRows, SensorRows, Track
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 from polyins.reading.guess import Stream, read_rows, read_table
-from polyins.reading.table_streams import HalfImu, stream_name
+from polyins.reading.half_imu import HalfImu
+from polyins.reading.table_stream import stream_name
 
 Facts = dict[str, Any]
 LARGE = 1e8

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from polyins.model.gps_time import WEEK_S
 from polyins.model.recording import Recording
 from polyins.studies.robustness.fault import Array, Draw, Fault, Mask, during, fixes, moved, with_fixes, with_gnss
 
@@ -14,7 +15,6 @@ OFF = ("jump", "reset", "rejected")
 DELAY = ("delay", "clock")
 PLACE = ("place", "jump")
 UNITS = ("units",)
-WEEK_S = 604800.0
 FOOT = 0.3048
 
 

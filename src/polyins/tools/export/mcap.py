@@ -13,7 +13,7 @@ from typing import IO, Any
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.formats.log import needed
+from polyins.formats.library import needed
 from polyins.model.recording import Array
 from polyins.model.rig import DEG
 from polyins.model.status import ALIGNING, ATTITUDE_ONLY, COASTING, STATUSES, TRACKING

@@ -11,7 +11,7 @@ from typing import IO
 import numpy as np
 
 from polyins.errors import InputError
-from polyins.formats.gps_time import leap_seconds
+from polyins.model.gps_time import leap_seconds
 from polyins.model.status import TRACKING
 from polyins.tools.export.trace import POSITION_STD, VELOCITY, VELOCITY_STD, Trace
 from polyins.version import __version__

@@ -16,8 +16,7 @@ import numpy as np
 
 from polyins.errors import InputError
 from polyins.files import new_file, whole
-from polyins.formats.gps_time import utc_of_week
-from polyins.live.nmea import UNIX_TIME
+from polyins.model.gps_time import EARLIEST_UNIX_S, utc_of_week
 from polyins.model.solution import Solution
 from polyins.model.status import ALIGNING, ATTITUDE_ONLY, NOT_TO_BE_USED
 from polyins.reading.position_stream import thinned
@@ -123,7 +122,7 @@ def _placed(trace: Trace, form: ExportFormat, options: ExportOptions) -> tuple[T
     utc = trace.utc_of_zero
     if options.utc_of_zero is not None:
         utc = utc_of(options.utc_of_zero, float(trace["time_s"][0]))
-    elif form.utc and utc is None and trace["time_s"][0] > UNIX_TIME:
+    elif form.utc and utc is None and trace["time_s"][0] > EARLIEST_UNIX_S:
         utc = 0.0
         begin = datetime.fromtimestamp(float(trace["time_s"][0]), UTC)
         notes.append(f"{trace.source}: stamps are taken for Unix time, which begins at {begin:%Y-%m-%d %H:%M:%S} UTC")

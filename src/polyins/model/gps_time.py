@@ -7,6 +7,9 @@ import numpy as np
 from polyins.model.recording import Array
 
 WEEK_S = 604800.0
+DAY_S = 86400.0
+EARLIEST_UNIX_S = 1e9
+"""stamps above this are seconds of Unix time, below they count from elsewhere"""
 GPS_EPOCH = np.datetime64("1980-01-06T00:00:00", "s")
 LEAP_DAYS = np.array(
     ["1981-07-01", "1982-07-01", "1983-07-01", "1985-07-01", "1988-01-01", "1990-01-01", "1991-01-01", "1992-07-01",

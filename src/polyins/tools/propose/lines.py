@@ -1,0 +1,57 @@
+"""The lines of a configuration, each with what it assumes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from polyins.model.findings import Finding
+
+CHECK = "# CHECK:"
+TURNED = Finding("mount", "", "doubt", remedy="give axes in a configuration (polyins init writes one)")
+"""of what would turn the heading if it were wrong"""
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """What nothing tells, and was taken to be so."""
+
+    sentence: str
+    finding: Finding | None = None
+    """the doubt that a result has with it"""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of YAML, and why to check it, if it is guessed or unknown."""
+
+    yaml: str
+    why: str = ""
+    doubt: Finding | None = None
+    """what it makes a result doubtful by, without the text"""
+
+    def __str__(self) -> str:
+        return "  ".join(part for part in (self.yaml, f"{CHECK} {self.why}" if self.why else "") if part)
+
+    @property
+    def assumption(self) -> Assumption | None:
+        """What it assumes."""
+        if not self.why:
+            return None
+        value = self.yaml.strip()
+        sentence = f"assumed {value} ({self.why})" if value else self.why
+        return Assumption(sentence, replace(self.doubt, text=sentence) if self.doubt else None)
+
+
+def quoted(text: object) -> str:
+    """Write a text as YAML."""
+    return "'" + str(text).replace("'", "''") + "'"
+
+
+def flow(value: Any) -> str:
+    """Write plain values as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(flow(item) for item in value) + "]"
+    return quoted(value) if isinstance(value, str) else str(value)
