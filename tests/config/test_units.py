@@ -164,11 +164,12 @@ def test_defaults_are_the_models(section, kind):
 
 ELSEWHERE: dict[str, set[str]] = {
     "FilterOptions": {"nonholonomic"},
+    "StartOptions": {"goes_on"},
     "Imu": {"rotation"},
     "Wheel": {"steering", "radius_std", "lever_arm_std"},
     "AidingSensor": {"kind", "offset_random_walk"},
 }
-"""fields that no key of a section gives by itself: they follow from several, or from which section it is"""
+"""fields that no key of a section gives by itself: they follow from several or from the section, or a run sets them"""
 OTHERWISE: dict[str, set[str]] = {
     "Noise": {"grade"},
     "WheelEntry": {"spin_axis", "side", "tilt_deg"},

@@ -70,7 +70,7 @@ def test_the_page_follows_a_replay(
             said[f"{snapshot.row['time_s']:.1f} s"] = json.loads(self.news)
 
     monkeypatch.setattr(live_run, "Page", Watched)
-    options = live_run.Options(drive, tmp_path, sinks=(), speed=10.0, page=0)
+    options = live_run.Options(drive, tmp_path, sinks=(), speed=4.0, page=0)
     thread = threading.Thread(target=live_run.run, args=(options,))
     thread.start()
     browser.get(wait_for(lambda: pages)[0].url)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from importlib import import_module
-from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from polyins.errors import InputError
@@ -37,12 +39,28 @@ def damage_named(path: Path, what: str, remedy: str = "") -> Iterator[None]:
 
 @contextmanager
 def heard() -> Iterator[list[str]]:
-    """Give a list that what a library prints inside becomes one note of: standard output is not the library's."""
+    """Give a list that what a library prints inside becomes one note of: standard output is not the library's.
+
+    From Python or from C: both streams lead to a file meanwhile.
+    """
     notes: list[str] = []
-    said = StringIO()
-    with redirect_stdout(said), redirect_stderr(said):
-        yield notes
-    lines = list(dict.fromkeys(line.strip() for line in said.getvalue().splitlines() if line.strip()))
+    with TemporaryFile() as file, open(file.fileno(), "w", errors="replace", closefd=False) as said:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        kept = {number: os.dup(number) for number in (1, 2)}
+        try:
+            for number in kept:
+                os.dup2(file.fileno(), number)
+            with redirect_stdout(said), redirect_stderr(said):
+                yield notes
+        finally:
+            said.flush()
+            for number, was in kept.items():
+                os.dup2(was, number)
+                os.close(was)
+        file.seek(0)
+        texts = file.read().decode(errors="replace").splitlines()
+    lines = list(dict.fromkeys(line.strip() for line in texts if line.strip()))
     if lines:
         more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
         notes.append(f"its library says: {lines[0]}{more}")

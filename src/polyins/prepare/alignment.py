@@ -16,7 +16,7 @@ from polyins.model.recording import AidingStream, GnssStream, Recording, StartOp
 from polyins.model.rig import DEG, Rig
 from polyins.prepare.first_motion import Beginning, FirstMotion
 from polyins.prepare.in_motion import Prior
-from polyins.prepare.rolling import HALF, RollingMotion, rolling_motion
+from polyins.prepare.rolling_start import HALF, RollingMotion, rolling_motion
 from polyins.prepare.timesync import Aligned
 from polyins.prepare.under_way import AROUND, HARDEST, GroundMotion, find_motion
 

@@ -8,7 +8,7 @@ from driven_vehicle import drive, without
 
 from polyins.errors import InputError
 from polyins.prepare.alignment import level
-from polyins.prepare.rolling import RollingMotion, rolling_motion
+from polyins.prepare.rolling_start import RollingMotion, rolling_motion
 from polyins.prepare.timesync import align
 
 TIMES = (30.0, 47.3, 61.9, 88.8)
