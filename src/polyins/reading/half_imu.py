@@ -14,6 +14,7 @@ from polyins.model.recording import Array
 from polyins.reading import column_names as said
 from polyins.reading import likely_units as likely
 from polyins.reading.column_names import SensorAxis, first_of_each
+from polyins.reading.doubts import Doubt, distinct
 from polyins.reading.likely_units import Likely
 from polyins.reading.sensor_columns import Three, scaled, stated, triples
 from polyins.reading.time_columns import TimeGuess
@@ -32,6 +33,8 @@ class HalfImu:
     time: Array
     values: Array
     """in the unit of the columns, shape (T, 3)"""
+    doubt: Doubt | None = None
+    """of its stamps"""
 
 
 def half_of(opened: OpenTable, time: TimeGuess, axes: dict[str, SensorAxis]) -> HalfImu | None:
@@ -58,11 +61,12 @@ def _taken_as(opened: OpenTable, time: TimeGuess, what: str, names: Three, unit:
     columns: dict[str, Any] = {"names": names}
     if known is not None:
         columns |= {"unit": known.unit} | scaled(known)
-    return HalfImu(what, opened.source, columns, time.column, time.seconds, values)
+    return HalfImu(what, opened.source, columns, time.column, time.seconds, values, time.doubt)
 
 
-def joined_columns(gyro: HalfImu, accel: HalfImu) -> dict[str, Any]:
-    """Return the columns of the IMU that two files make, the gyro's being the one that is named."""
+def joined_columns(gyro: HalfImu, accel: HalfImu) -> tuple[dict[str, Any], tuple[Doubt, ...]]:
+    """Return the columns of the IMU that two files make, the gyro's being the one that is named, and what is open."""
+    doubts = [gyro.doubt, accel.doubt]
     at = gyro.time[np.isfinite(gyro.time)]
     step = float(np.median(np.diff(at))) if len(at) > 1 else 0.0
     force, rates = dict(accel.columns), dict(gyro.columns)
@@ -74,12 +78,15 @@ def joined_columns(gyro: HalfImu, accel: HalfImu) -> dict[str, Any]:
                 "else declare columns with unit and scale"
             )
         force |= {"unit": unit.unit} | scaled(unit)
+        doubts.append(unit.doubt)
     if "unit" not in rates:
         whole = Likely(force["unit"], force.get("scale", 1.0))
         turning = likely.gyro_unit(gyro.values, accel.values[: len(gyro.values)], step, whole)
         rates |= {"unit": turning.unit} | scaled(turning)
-    return {
+        doubts.append(turning.doubt)
+    columns = {
         "time": gyro.time_column,
         "gyro": rates,
         "accel": force | {"file": accel.source.path, "time": accel.time_column},
     }
+    return columns, distinct(doubts)

@@ -131,6 +131,24 @@ def test_what_would_turn_the_heading_is_a_finding(tmp_path: Path) -> None:
     assert {one.sentence for one in proposal.assumptions} <= set(recording.warnings)
 
 
+def test_a_guessed_unit_of_a_gyro_in_a_file_of_its_own_is_a_finding(tmp_path: Path) -> None:
+    time = np.arange(1, 801) / 40.0
+    # as noisy as no gyro in rad/s, and nothing turns: it may be deg/s
+    turning = np.column_stack([time, np.random.default_rng(0).normal(0.0, 0.5, (len(time), 3))])
+    force = np.column_stack([time + 0.005, np.tile([0.1, 0.2, -9.8], (len(time), 1))])
+    files = [
+        write_rows(tmp_path / "gyroscope.csv", turning, "t,x,y,z", ","),
+        write_rows(tmp_path / "accelerometer.csv", force, "t,x,y,z", ","),
+    ]
+    kinds = [finding.kind for finding in propose(files).findings]
+    assert kinds == ["units", "mount"]
+    named = [
+        write_rows(tmp_path / "gyroscope.csv", turning, "t (s),x (rad/s),y (rad/s),z (rad/s)", ","),
+        write_rows(tmp_path / "accelerometer.csv", force, "t (s),x (m/s^2),y (m/s^2),z (m/s^2)", ","),
+    ]
+    assert [finding.kind for finding in propose(named).findings] == ["mount"]
+
+
 def test_assumptions_are_what_is_marked(tmp_path: Path) -> None:
     proposal = propose([write_rows(tmp_path / "imu.txt", as_increments(still_imu()))])
     marked = [line.partition(CHECK) for line in proposal.text.splitlines() if CHECK in line]

@@ -10,6 +10,10 @@ from polyins.model.findings import Finding
 CHECK = "# CHECK:"
 TURNED = Finding("mount", "", "doubt", remedy="give axes in a configuration (polyins init writes one)")
 """of what would turn the heading if it were wrong"""
+UNIT_GUESSED = Finding(
+    "units", "", "doubt", remedy="give columns with unit and scale in a configuration (polyins init writes one)"
+)
+"""of values whose unit is told by their size"""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from polyins.formats.recognize import data_format
 from polyins.model.axes import axes_matrix
 from polyins.tools.propose.axes import shared_axes
-from polyins.tools.propose.lines import TURNED, Line, flow, quoted
+from polyins.tools.propose.lines import UNIT_GUESSED, Line, flow, quoted
 from polyins.tools.propose.sources import FoundStream
 
 TRACK_FORMATS = {"kf-gins-gnss": "kf-gins"}
@@ -32,7 +32,7 @@ def format_lines(of: FoundStream, indent: str) -> list[Line]:
         return lines
     guessed = any(doubt.about == "units" for doubt in of.table.doubts)
     why = "; ".join(["names and units", *(doubt.text for doubt in of.table.doubts)])
-    lines.append(Line(f"{indent}columns:", why, TURNED if guessed else None))
+    lines.append(Line(f"{indent}columns:", why, UNIT_GUESSED if guessed else None))
     written = of.table.columns.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     return lines + [Line(f"{indent}  {group}: {flow(content)}") for group, content in written.items()]
 

@@ -102,7 +102,7 @@ def _paired(halves: Sequence[HalfImu], left_out: list[str]) -> list[FoundStream]
     gyros, accels = ([half for half in halves if half.what == what] for what in ("gyro", "accel"))
     found = []
     for gyro, accel in zip(gyros, accels, strict=False):
-        one = described(open_table(gyro.source.path), joined_columns(gyro, accel), [])
+        one = described(open_table(gyro.source.path), *joined_columns(gyro, accel))
         found.append(FoundStream(gyro.source.path, one.rows, table=one))
     for half in (*gyros[len(accels) :], *accels[len(gyros) :]):
         left_out.append(f"{half.source.path}: holds the {half.what} of an IMU alone, and is not used")
