@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 PICTURES := a3-sources a5=a5-length,a5-book,a5-roughness,a5-thickness afig3=afig3-std,afig3-imus,afig3-common afig6-tracks \
 	afig7=afig7-gyro,afig7-accelerometer afig8-errors bfig7-9=bfig7,bfig8,bfig9 bfig10 split-imus
 
-.PHONY: demo test test-oldest lint types bench live-flood reproduce pictures clean
+.PHONY: demo test test-long test-oldest lint types bench live-flood reproduce pictures clean
 
 $(BIN)/polyins: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -20,6 +20,10 @@ demo: $(BIN)/polyins
 
 test: $(BIN)/pytest
 	$(BIN)/pytest --numprocesses 2 --dist worksteal
+
+# What simulates for minutes.
+test-long: $(BIN)/pytest
+	$(BIN)/pytest --numprocesses 2 --dist worksteal -m long
 
 # The kernels and the reference filters with the oldest Numba that pyproject.toml allows.
 test-oldest: build/oldest/bin/pytest

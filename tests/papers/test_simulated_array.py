@@ -6,6 +6,7 @@ import pytest
 from polyins.studies import array
 
 
+@pytest.mark.long
 def test_sixteen_independent_imus_gain_more_than_three_point_two(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(array, "SCENARIOS", {"independent": array.SCENARIOS["independent"]})
     figures = array.reproduce()["polyins"]["independent"]

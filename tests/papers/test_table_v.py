@@ -5,6 +5,7 @@ import pytest
 from polyins.studies.progress import Steps
 from polyins_papers import a5, nonrigid
 
+pytestmark = pytest.mark.long
 SEEDS = a5.BLOCK
 METHODS = ("single", "imu-fusion", "nav-fusion")
 

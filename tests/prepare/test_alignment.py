@@ -583,6 +583,7 @@ def under_way(speed: float, noise: float, seed: int, duration: float = 90.0) -> 
     return replace(recording, gnss=GnssStream(time, position, np.full((len(time), 3), noise))), driven
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("speed", "noise"), [(15.0, 5.0), (4.0, 2.0), (2.0, 0.5), (1.0, 0.02)])
 def test_a_course_is_as_sure_as_the_way_is_long_against_the_noise(speed: float, noise: float) -> None:
     """Of forty starts all within four of their std, and their mean square is that of one."""

@@ -16,6 +16,7 @@ OF_SESSIONS = {
 """its rows of a single session; the recording RAW_1111, of nine outages, hangs on the draw of the noise by 12 %"""
 
 
+@pytest.mark.long
 def test_the_flights_reach_the_first_study(data_folder: Path) -> None:
     document = flights.reproduce()["polyins"]
     for length, (single, fused) in FIRST_STUDY.items():

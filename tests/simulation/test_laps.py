@@ -46,7 +46,7 @@ def test_laps_begin_and_end_at_rest(path):
     assert path.speed(np.array([path.duration]))[0] == 0.0
 
 
-@pytest.mark.parametrize("vehicle", [ROBOT, CAR], ids=lambda vehicle: vehicle.name)
+@pytest.mark.parametrize("vehicle", [ROBOT, pytest.param(CAR, marks=pytest.mark.long)], ids=lambda one: one.name)
 def test_stand_ins_are_drivable(vehicle):
     scenario = vehicle.scenario()
     path = true_run(scenario).path
@@ -58,7 +58,7 @@ def test_stand_ins_are_drivable(vehicle):
     assert speed.max() / scenario.wheels[0].radius_m < np.radians(2000.0)
 
 
-@pytest.mark.parametrize("vehicle", [ROBOT, CAR], ids=lambda vehicle: vehicle.name)
+@pytest.mark.parametrize("vehicle", [ROBOT, pytest.param(CAR, marks=pytest.mark.long)], ids=lambda one: one.name)
 def test_vehicles_go_up_and_down_and_lean_as_the_ground_does(vehicle):
     hilly, level = (true_run(vehicle.scenario(level=level)).path for level in (False, True))
     time = np.arange(40.0, hilly.duration, 0.1)
