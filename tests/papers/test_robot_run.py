@@ -153,6 +153,7 @@ def test_a_plane_takes_the_place_of_the_earth(short):
     assert all(old is new for old, new in zip(short.imus, flat.imus, strict=True))
 
 
+@pytest.mark.long
 def test_without_errors_the_robot_is_within_5_mm_on_the_turning_earth(monkeypatch):
     # 6 mm where the earth's rate about the axle is taken for rolling
     monkeypatch.setattr(b6, "PREDICTIONS", {"window": b6.PREDICTIONS["window"]})
@@ -162,6 +163,7 @@ def test_without_errors_the_robot_is_within_5_mm_on_the_turning_earth(monkeypatc
     assert worst < 0.005
 
 
+@pytest.mark.long
 def test_a_wheel_does_not_know_the_slope_and_the_body_does(monkeypatch):
     monkeypatch.setattr(b6, "PREDICTIONS", {"window": b6.PREDICTIONS["window"]})
     monkeypatch.setattr(b6, "ONE_SAMPLE_S", b6.WINDOW)

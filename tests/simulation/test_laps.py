@@ -58,7 +58,8 @@ def test_stand_ins_are_drivable(vehicle):
     assert speed.max() / scenario.wheels[0].radius_m < np.radians(2000.0)
 
 
-@pytest.mark.parametrize("vehicle", [ROBOT, pytest.param(CAR, marks=pytest.mark.long)], ids=lambda one: one.name)
+@pytest.mark.long
+@pytest.mark.parametrize("vehicle", [ROBOT, CAR], ids=lambda vehicle: vehicle.name)
 def test_vehicles_go_up_and_down_and_lean_as_the_ground_does(vehicle):
     hilly, level = (true_run(vehicle.scenario(level=level)).path for level in (False, True))
     time = np.arange(40.0, hilly.duration, 0.1)
