@@ -37,10 +37,11 @@ def _families() -> list[tuple[str, Callable[[], None]]]:
     """Return a name and a run for each set of types that something is compiled for."""
     from polyins.tools import bench
 
-    array, vehicle = _headed(bench.array(2, SECONDS)), _headed(bench.vehicle(SECONDS))
+    under_way = bench.array(2, SECONDS)
+    array, vehicle = _headed(under_way), _headed(bench.vehicle(SECONDS))
     with_gnss = _with_fixes(vehicle)
     batches = [
-        ("arrays with GNSS", "enav-fusion", array),
+        ("arrays with GNSS", "enav-fusion", under_way),
         ("arrays with GNSS velocity", "enav-fusion", _with_velocities(array)),
         ("arrays without GNSS", "enav-fusion", _without_fixes(array)),
         ("wheels", "triple-ins", vehicle),
