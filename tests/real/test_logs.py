@@ -45,14 +45,6 @@ SENSORS = {"attitude": ("heading", -1), "wheel": ("odometer", 3)}
 
 
 @pytest.fixture(scope="module")
-def logs(data_folder: Path) -> Path:
-    folder = data_folder / "logs"
-    if not folder.is_dir():
-        pytest.skip(f"no logs: {folder} is not a folder")
-    return folder
-
-
-@pytest.fixture(scope="module")
 def expected(logs: Path) -> dict[str, Any]:
     found: dict[str, Any] = json.loads((logs / "expected.json").read_text())
     return found

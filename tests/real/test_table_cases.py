@@ -26,14 +26,6 @@ HALF_DIGIT = 1.0 + 1e-6
 
 
 @pytest.fixture(scope="module")
-def logs(data_folder: Path) -> Path:
-    folder = data_folder / "logs"
-    if not folder.is_dir():
-        pytest.skip(f"no logs: {folder} is not a folder")
-    return folder
-
-
-@pytest.fixture(scope="module")
 def cases(logs: Path) -> Path:
     return logs / "cases"
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from polyins.evaluation.errors import compare_to_reference
 from polyins.formats.documents import plain
 from polyins.live.replay import Replay
-from polyins.model.attitude import euler_angles, euler_variance
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
 from polyins.navigate import batch
@@ -31,6 +30,7 @@ from polyins.simulation.run import simulate
 from polyins.simulation.scenario import Fixes, Scenario
 from polyins.studies.robustness.case import SCENARIOS
 from polyins.studies.robustness.gap_faults import paused
+from polyins.studies.robustness.stated_errors import StatedErrors, stated_errors
 from polyins.tools.parallel import run_all
 
 Array = NDArray[np.float64]
@@ -66,17 +66,6 @@ CARRIERS = (
     Carrier("wheels with GNSS", "wheels", "triple-ins", True),
     Carrier("wheels", "wheels", "triple-ins", False),
 )
-
-
-class StatedErrors(NamedTuple):
-    """Errors of a solution, and what it said they might be."""
-
-    time: Array
-    """s, shape (T,)"""
-    horizontal: Array
-    """m, shape (T,)"""
-    over: Array
-    """the larger one of horizontal position and heading over its standard deviation, shape (T,)"""
 
 
 @dataclass(frozen=True)
@@ -217,15 +206,9 @@ def _fed(navigator: Navigator, samples: list[Sample], recording: Recording) -> l
 
 
 def track(solution: Solution, recording: Recording) -> StatedErrors:
-    """Return the errors of a solution."""
+    """Return the errors of a solution of a recording that has the truth."""
     assert recording.reference is not None
-    errors = compare_to_reference(solution, recording.reference)
-    assert errors.attitude is not None
-    rows = errors.covered
-    variance = euler_variance(euler_angles(solution.attitude[rows]), solution.phi_covariance[rows])
-    position = errors.horizontal / np.sqrt(solution.position_variance[rows, :2].sum(axis=1))
-    heading = np.abs(errors.attitude[:, 2]) / np.sqrt(variance[:, 2])
-    return StatedErrors(errors.time, errors.horizontal, np.maximum(position, heading))
+    return stated_errors(solution, compare_to_reference(solution, recording.reference))
 
 
 def print_tables(figures: Mapping[str, Any]) -> None:

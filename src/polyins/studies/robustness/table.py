@@ -14,7 +14,6 @@ import numpy as np
 from polyins.errors import InputError
 from polyins.evaluation.errors import Errors
 from polyins.formats.documents import plain
-from polyins.model.attitude import euler_angles, euler_variance
 from polyins.model.findings import DO_NOT_USE, TRUST, Finding
 from polyins.model.recording import Recording
 from polyins.model.solution import Solution
@@ -22,6 +21,7 @@ from polyins.reading.loading import load
 from polyins.screen import number, print_table
 from polyins.simulation.files import write
 from polyins.studies.robustness.case import PARTS, Case, cases, good
+from polyins.studies.robustness.stated_errors import stated_errors
 from polyins.tools.navigation import run
 from polyins.tools.parallel import run_all
 
@@ -121,13 +121,7 @@ def _run(recording: Recording, method: str) -> tuple[Solution, Errors, str, tupl
 
 def _errors(solution: Solution, errors: Errors) -> tuple[float, float]:
     """Return the horizontal rms error, m, and the largest error over its standard deviation."""
-    rows = errors.covered
-    std = np.sqrt(solution.position_variance[rows, :2].sum(axis=1))
-    over = float(np.max(errors.horizontal / std))
-    if errors.attitude is not None:
-        variance = euler_variance(euler_angles(solution.attitude[rows]), solution.phi_covariance[rows])
-        over = max(over, float(np.max(np.abs(errors.attitude[:, 2]) / np.sqrt(variance[:, 2]))))
-    return float(np.sqrt(np.mean(errors.horizontal**2))), over
+    return float(np.sqrt(np.mean(errors.horizontal**2))), float(np.max(stated_errors(solution, errors).over))
 
 
 def _false_findings(seeds: tuple[int, ...]) -> list[str]:
