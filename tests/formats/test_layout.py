@@ -91,6 +91,20 @@ def test_messages_between_rows_are_left_out_and_lines_stay_right(tmp_path: Path)
     assert "3 line(s) between the rows" in source.warnings[0]
 
 
+@pytest.mark.parametrize(("end", "mark"), [("\n", ","), ("\r\n", ","), ("\n", " ")])
+def test_empty_lines_and_messages_move_no_line_number(end: str, mark: str, tmp_path: Path) -> None:
+    lines = ["t,x,y", *ROWS[:5], "", *ROWS[5:10], "PPS", "", *ROWS[10:], "15.5,word,1"]
+    path = tmp_path / "a.csv"
+    path.write_text(end.join(line.replace(",", mark) for line in lines) + end, newline="")
+    table = open_table(path)
+    # one column after the other, as they are asked for
+    np.testing.assert_array_equal(table.numbers(["t"])[0][:30], 0.5 * np.arange(1, 31))
+    assert list(table.texts("y")[:30]) == [row.split(",")[2] for row in ROWS]
+    assert [table.source.line(row) for row in (0, 5, 10, 29)] == [2, 8, 15, 34]
+    with pytest.raises(InputError, match=r"line 35: x is 'word'"):
+        table.numbers(["x"])
+
+
 def test_few_rows_are_not_enough_to_call_one_cut() -> None:
     content = b"t,x\n1,2\n3"
     assert cut_end(content, layout("a.csv", content), 4) == len(content)

@@ -9,7 +9,7 @@ import pytest
 
 from polyins.errors import InputError
 from polyins.formats.recognize import data_format
-from polyins.formats.rtklib import read_gnss
+from polyins.formats.rtklib import read_gnss, utc_of_zero
 from polyins.model.rig import DEG
 from polyins.reading.loading import load
 
@@ -174,3 +174,21 @@ def test_one_broken_row_among_whole_ones_is_named_and_left_out(tmp_path: Path) -
     assert len(track.time) == 2
     assert f"line {len(lines) - 1}: " in track.warnings[0]
     assert track.source.place(1).endswith(f"line {len(lines)}")
+
+
+DATED = [f"2022/07/03 00:00:0{n}.000" for n in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("times", "headed"), [(["2217 1.0", "2217 2.0", "2217 3.0"], True), (DATED, True), (DATED, False)]
+)
+def test_a_broken_first_row_changes_no_clock(times: list[str], headed: bool, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.pos", times)
+    kept = [line for line in path.read_text().splitlines() if headed or not line.startswith("%")]
+    first = next(n for n, line in enumerate(kept) if not line.startswith("%"))
+    path.write_text("\n".join([*kept[:first], kept[first][5:40], *kept[first + 1 :]]) + "\n")
+    assert data_format(path) == "rtklib-pos"
+    track = read_gnss(path)
+    np.testing.assert_allclose(track.time, [2.0, 3.0], atol=1e-6)
+    # the week began at midnight of GPS time, 18 s before that of UTC
+    assert utc_of_zero(path) == 1656806400.0 - 18.0

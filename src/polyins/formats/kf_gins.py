@@ -224,7 +224,7 @@ def _numbers(path: str | Path, content: bytes, wanted: dict[int, str]) -> tuple[
         try:
             rows = np.loadtxt(content.splitlines(), ndmin=2, comments=None)
         except ValueError as error:
-            raise _bad_line(find(path), content) from error
+            raise _bad_line(source, content) from error
     if rows.shape[1] not in wanted:
         expected = " or ".join(f"{count} ({names})" for count, names in wanted.items())
         raise InputError(f"{find(path)}: {rows.shape[1]} columns; expected {expected}")
@@ -232,16 +232,15 @@ def _numbers(path: str | Path, content: bytes, wanted: dict[int, str]) -> tuple[
 
 
 def _whole_lines(path: str | Path, content: bytes) -> tuple[RowSource, bytes]:
-    """Return where the rows come from, and the text without lines that were cut off."""
-    source = RowSource(str(find(path)), 1)
+    """Return where the rows come from, and the text without lines that were cut off or are empty."""
     try:
         table = layout(path, content)
     except InputError:
-        return source, content
-    whole, warnings = whole_rows(find(path), content, table)
-    if any(table.names) or not warnings:
-        return source, content
-    return RowSource(source.path, table.first_line, warnings=warnings), bytes(whole)
+        return RowSource(str(find(path)), 1), content
+    source, rows = whole_rows(find(path), content, table)
+    if any(table.names) or not (source.warnings or source.lines is not None):
+        return RowSource(source.path, 1), content
+    return source, bytes(rows)
 
 
 def _evenly_spaced(content: bytes) -> Array | None:
@@ -263,20 +262,20 @@ def _evenly_spaced(content: bytes) -> Array | None:
     return np.column_stack([to_numpy(column) for column in table.columns])
 
 
-def _bad_line(path: Path, content: bytes) -> InputError:
+def _bad_line(source: RowSource, content: bytes) -> InputError:
     """Find the line that is to blame: the first that is not numbers, or not as many as the first line has."""
     width = 0
-    for number, line in enumerate(content.splitlines(), 1):
-        fields = line.split()
+    for row, line in enumerate(content.splitlines()):
+        fields, place = line.split(), source.place(row)
         for text in fields:
             try:
                 float(text)
             except ValueError:
-                return InputError(f"{path}, line {number}: {text.decode(errors='replace')!r}; expected a number")
+                return InputError(f"{place}: {text.decode(errors='replace')!r}; expected a number")
         width = width or len(fields)
         if fields and len(fields) != width:
-            return InputError(f"{path}, line {number}: {len(fields)} columns; expected {width} as in the lines before")
-    return InputError(f"{path}: cannot be read as rows of numbers")
+            return InputError(f"{place}: {len(fields)} columns; expected {width} as in the lines before")
+    return InputError(f"{source.path}: cannot be read as rows of numbers")
 
 
 def _write_text(path: str | Path, rows: Array, formats: list[str] | tuple[str, ...]) -> None:

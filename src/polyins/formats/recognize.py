@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -30,7 +29,7 @@ from polyins.formats import (
 from polyins.formats.columns import PARQUET_MAGIC
 from polyins.formats.layout import is_number, sample
 from polyins.formats.log import Log
-from polyins.formats.rtklib import has_rows
+from polyins.formats.rtklib import is_solution
 from polyins.model.recording import Array
 
 HEAD_BYTES = 16384
@@ -130,9 +129,7 @@ def data_format(path: str | Path) -> str:
     rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
     if any("Acc_X" in line and "Gyr_X" in line for line in lines):
         return "xsens-dot"
-    if (
-        lines[0].startswith("%") and any(re.search(r"latitude\(|-ecef\(|-baseline\(", line) for line in lines)
-    ) or has_rows(rows):
+    if is_solution(lines):
         return "rtklib-pos"
     if _are_many_rows(content):
         return _rows_of_numbers(content) or "table"

@@ -24,6 +24,9 @@ from polyins.model.rig import DEG
 JST_AHEAD_S = 9 * 3600.0
 """of UTC"""
 HEAD_BYTES = 16384
+ROW = re.compile(r"\d{4}/\d\d/\d\d \d\d:\d\d:\d\d\.\d+(\s+-?[\d.]+){10}")
+FIRST_ROWS = 3
+"""of which one at least is whole"""
 QUALITIES = {1: "fix", 2: "float", 3: "sbas", 4: "dgps", 5: "single", 6: "ppp"}
 ORDER = ("latitude", "longitude", "height", "q", "ns", "sdn", "sde", "sdu", "sdne", "sdeu", "sdun", "age", "ratio",
          "vn", "ve", "vu", "sdvn", "sdve", "sdvu")  # fmt: skip
@@ -42,8 +45,8 @@ def read_gnss(path: str | Path) -> Track:
     numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("%")]
     if not numbered:
         raise InputError(f"{found}: has a header and no rows; expected positions")
-    dated = "/" in numbered[0][1]
     rows, kept, broken = _rows(found, numbered)
+    dated = "/" in numbered[kept[0]][1]
     clock = _clock(header)
     time = _seconds_from_date(rows[:, :6], clock) if dated else _seconds_from_week(rows[:, :2])
     values = rows[:, 6 if dated else 2 :]
@@ -79,15 +82,18 @@ def utc_of_zero(path: str | Path) -> float | None:
     """Return Unix time at the begin of the week that the stamps count from, s; None of a file that is not RTKLIB's."""
     lines = read_head(path, HEAD_BYTES).decode("utf-8-sig", errors="replace").splitlines()
     header = " ".join(line for line in lines if line.startswith("%"))
-    first = next((line for line in lines if line.strip() and not line.startswith("%")), "")
-    if not has_rows([first]) and not re.search("latitude|-ecef", header):
+    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("%")]
+    if not is_solution(lines):
         return None
-    begin = [float(text) for text in re.sub(r"[/:,]", " ", first).split()]
-    if "/" not in first:
-        week, second = begin[0], begin[1]
+    try:
+        rows, kept, _ = _rows(find(path), numbered)
+    except InputError:  # which its reader says
+        return None
+    if "/" not in numbered[kept[0]][1]:
+        week, second = rows[0, 0], rows[0, 1]
     else:
-        week, second = divmod(float(_since_epoch(np.array([begin[:6]]), _clock(header))[0]), WEEK_S)
-    return float(utc_of_week(np.array([week]), np.array([second]))[0]) - second
+        week, second = divmod(float(_since_epoch(rows[:1, :6], _clock(header))[0]), WEEK_S)
+    return float(utc_of_week(np.array([week]), np.array([second]))[0]) - float(second)
 
 
 def _clock(header: str) -> str:
@@ -95,9 +101,13 @@ def _clock(header: str) -> str:
     return next((name for name in ("UTC", "JST") if re.search(rf"%\s+{name}\s+(lat|x-ecef)", header)), "GPST")
 
 
-def has_rows(lines: Sequence[str]) -> bool:
-    """Whether lines without a header look like rows: a date and a time of day, then numbers."""
-    return bool(lines) and re.match(r"\d{4}/\d\d/\d\d \d\d:\d\d:\d\d\.\d+(\s+-?[\d.]+){10}", lines[0]) is not None
+def is_solution(lines: Sequence[str]) -> bool:
+    """Whether a text that begins with these lines is a solution: by its header, or dates, times of day and numbers."""
+    named = any(re.search(r"latitude\(|-ecef\(|-baseline\(", line) for line in lines)
+    if named and lines[0].startswith("%"):
+        return True
+    rows = [line for line in lines if line.strip() and not line.startswith(("%", "#", "sep="))]
+    return any(ROW.match(row) for row in rows[:FIRST_ROWS])
 
 
 def _warnings(path: Path, header: str, counts: dict[str, int]) -> tuple[str, ...]:

@@ -41,8 +41,7 @@ class TextTable:
         self.path = find(path)
         self._dialect = layout(path, content, header_has)
         self.names = self._dialect.names
-        self._content, warnings = whole_rows(self.path, content, self._dialect)
-        self.source = RowSource(str(self.path), self._dialect.first_line, warnings=warnings)
+        self.source, self._content = whole_rows(self.path, content, self._dialect)
         self._parsed: dict[int, Array] = {}
 
     def numbers(self, wanted: Sequence[Column], *, text_is_nan: bool = False) -> list[Array]:
@@ -75,7 +74,7 @@ class TextTable:
         from pyarrow import string
 
         place = place_of(self.path, self.names, column)
-        self.source, (cells,) = _parse(self.source, self._content, self._dialect, [place], string())
+        self.source, self._content, (cells,) = _parse(self.source, self._content, self._dialect, [place], string())
         return np.array([text.strip() for text in cells.to_pylist()], dtype=str)
 
 
@@ -89,8 +88,7 @@ def text_pieces(path: str | Path, wanted: Sequence[Column]) -> Iterator[tuple[Ro
             line, first = table.first_line, table
         else:
             first = replace(table, first_line=1)
-        whole, warnings = whole_rows(found, content, first, ahead=line - first.first_line)
-        source = RowSource(str(found), line, warnings=warnings)
+        source, whole = whole_rows(found, content, first, ahead=line - first.first_line)
         source, _, values = _text_columns(source, whole, table, places, False)
         yield source, values
         line += content.count(b"\n") - (first.first_line - 1)
@@ -110,10 +108,10 @@ def _whole_lines(path: Path) -> Iterator[bytes]:
             yield rest
 
 
-def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tuple[Text, tuple[str, ...]]:
-    """Return the lines from the first row on as the parser takes them, and warnings of lines that are cut off.
+def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tuple[RowSource, Text]:
+    """Return the lines from the first row on as the parser takes them, and where they are from.
 
-    `ahead`: lines of the file before the content.
+    Lines that are cut off are left out with a warning, empty ones without. `ahead`: lines before the content.
     """
     begin = offset_of_line(content, table.first_line - 1)
     cut = list(table.cut)
@@ -123,8 +121,16 @@ def whole_rows(path: Path, content: bytes, table: Dialect, ahead: int = 0) -> tu
     named = " and ".join(str(line) for line in cut)
     lines = f"line {named} is" if len(cut) == 1 else f"lines {named} are"
     plain = content.isascii() and not table.decimal_comma and table.delimiter != " "
-    text = memoryview(content)[begin:end] if plain else _tidy(content[begin:end], table)
-    return text, (f"{path}: {lines} cut off, and left out",) if cut else ()
+    warnings = (f"{path}: {lines} cut off, and left out",) if cut else ()
+    source = RowSource(str(path), ahead + table.first_line, warnings=warnings)
+    if plain and b"\n\n" not in content and b"\n\r\n" not in content:
+        return source, memoryview(content)[begin:end]
+    text = content[begin:end] if plain else _tidy(content[begin:end], table)
+    rows = text.splitlines(keepends=True) if b"\n\n" in text or b"\n\r\n" in text else []
+    kept = [n for n, row in enumerate(rows) if row.strip()]
+    if len(kept) == len(rows):
+        return source, text
+    return source.at(np.array(kept)), b"".join(rows[n] for n in kept)
 
 
 def _tidy(content: bytes, table: Dialect) -> bytes:
@@ -162,12 +168,12 @@ def _text_columns(
 
     try:
         try:
-            source, columns = _parse(source, content, table, places, float64(), empty=("",))
+            source, content, columns = _parse(source, content, table, places, float64(), empty=("",))
         except ArrowInvalid:
-            source, columns = _parse(source, content, table, places, float64())
+            source, content, columns = _parse(source, content, table, places, float64())
     except ArrowInvalid:
         source, content = _without_words(source, content, table)
-        source, cells = _parse(source, content, table, places, binary())
+        source, content, cells = _parse(source, content, table, places, binary())
         return source, content, _numbers(source, table, places, cells, text_is_nan)
     return source, content, [to_numpy(column) for column in columns]
 
@@ -180,18 +186,24 @@ def _without_words(source: RowSource, content: Text, table: Dialect) -> tuple[Ro
     kept = [n for n in kept if len(cells[n]) == table.width or not is_message(cells[n])]
     if len(kept) == len(lines) or not kept:
         return source, content
-    source = source.at(np.array(kept)).warned(f"{len(lines) - len(kept)} line(s) between the rows are none of them")
+    return _only(source, lines, np.array(kept))
+
+
+def _only(source: RowSource, lines: Sequence[bytes], kept: NDArray[np.intp]) -> tuple[RowSource, Text]:
+    """Return those of the lines, each with its number in the source, that are rows."""
+    source = source.at(kept).warned(f"{len(lines) - len(kept)} line(s) between the rows are none of them")
     return source, b"".join(lines[n] for n in kept)
 
 
 def _parse(
     source: RowSource, content: Text, table: Dialect, places: list[int], kind: Any, empty: Sequence[str] | None = None
-) -> tuple[RowSource, list[Any]]:
+) -> tuple[RowSource, Text, list[Any]]:
     """Parse the columns with Arrow; names are replaced by numbers, since a file may repeat or omit them.
 
     `empty`: what a cell without a value may look like, the fewer the faster; unless given NA, NULL and their like, too.
 
-    Messages between the rows are left out. Raises InputError for a row with another number of columns.
+    Messages between the rows are left out, of the source and the content that are returned as well. Raises InputError
+    for a row with another number of columns.
     """
     from pyarrow import ArrowInvalid
 
@@ -211,10 +223,10 @@ def _parse(
         if bad:
             raise InputError(bad[0]) from error
         raise
-    if messages and source.lines is None:
-        rows = np.delete(np.arange(len(columns[0]) + len(messages)), np.array(messages) - 1)
-        source = source.at(rows).warned(f"{len(messages)} line(s) between the rows are none of them")
-    return source, columns
+    if messages:
+        lines = bytes(content).splitlines(keepends=True)
+        source, content = _only(source, lines, np.delete(np.arange(len(lines)), np.array(messages) - 1))
+    return source, content, columns
 
 
 def csv_columns(

@@ -11,7 +11,7 @@ import numpy as np
 
 from polyins.files import find, plain_suffix, write_bytes
 from polyins.formats.arrow_arrays import to_arrow
-from polyins.formats.columns import column_names, is_parquet, read_columns
+from polyins.formats.columns import column_names, read_columns
 from polyins.formats.rows import RowSource, SensorRows, Track
 from polyins.model.recording import Array, GnssStream, ImuStream
 from polyins.model.rig import DEG
@@ -76,8 +76,6 @@ def utc_of_zero(path: str | Path) -> float | None:
     """Return the Unix time at which the stamps of a Parquet file are zero, s, if polyins wrote it and knew."""
     from pyarrow import ArrowException, parquet
 
-    if not is_parquet(path):
-        return None
     try:
         metadata = parquet.read_metadata(find(path)).metadata or {}
     except (ArrowException, OSError):  # packed, or damaged, which its reader says

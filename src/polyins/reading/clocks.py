@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -110,12 +111,11 @@ def _utc_of_zero(entry: ImuEntry | GnssEntry) -> float | None:
         return None
     if isinstance(entry, ImuEntry) and entry.rate_hz is not None:
         return None  # rows are counted
-    if entry.format == "auto" and log_format(entry.file) is not None:
-        utc = read_log(entry.file).utc_of_zero
-    elif is_parquet(entry.file):
-        utc = written_table.utc_of_zero(entry.file)
-    elif isinstance(entry, GnssEntry) and entry.format in ("auto", "rtklib-pos"):
-        utc = rtklib.utc_of_zero(entry.file)
-    else:
-        utc = None
+    is_log = entry.format == "auto" and log_format(entry.file) is not None
+    utc = read_log(entry.file).utc_of_zero if is_log else utc_of_file(entry.file)
     return None if utc is None else utc - entry.clock_offset_s
+
+
+def utc_of_file(path: str | Path) -> float | None:
+    """Return the Unix time at which the stamps of a file of one stream are zero, s, if it tells it."""
+    return written_table.utc_of_zero(path) if is_parquet(path) else rtklib.utc_of_zero(path)

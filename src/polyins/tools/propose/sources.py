@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from polyins.errors import InputError
-from polyins.formats import rtklib, written_table
 from polyins.formats.columns import open_table
 from polyins.formats.log import Log
 from polyins.formats.recognize import data_format, log_format, read_log
 from polyins.formats.rows import ImuRows, SensorRows, Track
+from polyins.reading.clocks import utc_of_file
 from polyins.reading.guess import read_stream, read_table
 from polyins.reading.half_imu import HalfImu, joined_columns
 from polyins.reading.table_imus import described
@@ -33,7 +33,7 @@ class FoundStream:
     def utc_of_zero(self) -> float | None:
         """Unix time at which its stamps are zero, s, where its file tells it; a log gets fixes when they are old."""
         if self.log is None:
-            return rtklib.utc_of_zero(self.path) or written_table.utc_of_zero(self.path)
+            return utc_of_file(self.path)
         return None if self.log.utc_of_zero is None else self.log.utc_of_zero + (self.log.fix_age or 0.0)
 
     @property
