@@ -371,6 +371,37 @@ def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
 
 
 @cli.command()
+@click.argument("inputs", metavar="CONFIG|LOG...", type=FILE, nargs=-1, required=True)
+@click.option("--out", type=FOLDER, default=None, help="Folder for allan.json, noise.yaml and the page allan.html.")
+@as_json_option
+def allan(inputs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
+    """Tell the noise of IMUs from where they rest: Allan deviation, random walks, bias instability, an array's gain."""
+    from polyins.calibration import noise_listing
+    from polyins.tools.noise import noise_figures, read_streams, write_noise
+
+    if out is not None:
+        make_folder(out)
+    with progress("reading"):
+        settings = _settings(inputs)
+        streams, known = read_streams(settings)
+    with progress("allan"):
+        figures = noise_figures(streams, known)
+    if out is not None:
+        write_noise(out, settings.config.name, figures)
+    if as_json:
+        _print_json(noise_listing.document(figures))
+        return
+    print_table(settings.config.name, noise_listing.COLUMNS, noise_listing.rows(figures))
+    for text in noise_listing.sentences(figures.array) if figures.array else ():
+        say(text)
+    for text in noise_listing.worst(figures.findings):
+        say(text)
+    click.echo(noise_listing.configuration(figures), nl=False)
+    if out is not None:
+        say(f"files: {out}, page: {out / 'allan.html'}")
+
+
+@cli.command()
 @click.argument("solution", type=FILE)
 @click.option("--reference", type=FILE, required=True, help="A file with the true positions.")
 @as_json_option

@@ -737,17 +737,9 @@ def find_standstill(
     `bias`, m/s^2, the rate no more than a gyro's bias, and the fixes keep to their place but for their noise: steady
     acceleration, turn or motion is none.
     """
-    window = max(2, round(WINDOW * aligned.rate_hz))
-    tenth = max(1, round(0.1 * aligned.rate_hz))
-    tenths = window // tenth
-    count = len(aligned.time) // (tenth * tenths)
-    if count < SHORTEST_STANDSTILL / WINDOW:
+    edges, still = still_seconds(aligned)
+    if len(still) < SHORTEST_STANDSTILL / WINDOW:
         return None
-    used = count * tenths * tenth
-    rates = aligned.increments[:used].mean(axis=2) * aligned.rate_hz
-    spread = rates.reshape(count, tenths, tenth, 6).mean(axis=2).std(axis=1)
-    still = (spread[:, :3].max(axis=1) < STILL_RATE) & (spread[:, 3:].max(axis=1) < STILL_FORCE)
-    edges = aligned.time[np.minimum(np.arange(count + 1) * tenths * tenth, len(aligned.time) - 1)]
     if fixes is not None and fixes.velocity is not None:
         speed = np.linalg.norm(usual_velocity(fixes), axis=1)
         noise = 4.0 * fixes.position_std.max(axis=1)
@@ -764,6 +756,27 @@ def find_standstill(
         if by_imus and keeps_place(fixes, geodetic, *interval):
             return interval
     return None
+
+
+def still_seconds(aligned: Aligned) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the edges of windows of a second, s, (K + 1,), and in which of them nothing moves, (K,).
+
+    There rates and forces, averaged over tenths and over the IMUs, hardly vary.
+    """
+    edges, spread = second_spreads(aligned)
+    return edges, (spread[:, :3].max(axis=1) < STILL_RATE) & (spread[:, 3:].max(axis=1) < STILL_FORCE)
+
+
+def second_spreads(aligned: Aligned) -> tuple[Array, Array]:
+    """Return the edges of windows of a second, (K + 1,), and the std of tenths in them, rad/s and m/s^2, (K, 6)."""
+    window = max(2, round(WINDOW * aligned.rate_hz))
+    tenth = max(1, round(0.1 * aligned.rate_hz))
+    tenths = window // tenth
+    count = len(aligned.time) // (tenth * tenths)
+    used = count * tenths * tenth
+    rates = aligned.increments[:used].mean(axis=2) * aligned.rate_hz
+    spread = rates.reshape(count, tenths, tenth, 6).mean(axis=2).std(axis=1)
+    return aligned.time[np.minimum(np.arange(count + 1) * tenths * tenth, len(aligned.time) - 1)], spread
 
 
 def feels_gravity(aligned: Aligned, begin: float, end: float, bias: float) -> bool:

@@ -55,7 +55,7 @@ SETTINGS = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": 
 def write_report(path: Path, scene: Scene, comparison: CompareDocument | None = None) -> None:
     """Write the report of a scene to `path`; with the `compare` document the table shows its figures and ratios."""
     recording = scene.recording
-    text = _template().render(
+    text = template("report.html.j2").render(
         title=recording.name,
         version=__version__,
         facts=facts(scene),
@@ -64,7 +64,7 @@ def write_report(path: Path, scene: Scene, comparison: CompareDocument | None = 
         verdicts=verdicts(scene),
         sections=_sections(scene),
         config=recording.config_text,
-        plotly=_plotly_script(),
+        plotly=plotly_script(),
         pooled=next((run.name for run in scene.runs if comparison and "each" in comparison["methods"][run.name]), None),
     )
     with whole(path) as beside:
@@ -98,7 +98,8 @@ def _what_is_shaded(scene: Scene) -> str:
     return f"{outages} {gaps}".strip()
 
 
-def _plotly_script() -> str:
+def plotly_script() -> str:
+    """Return plotly.js, which a page that needs no network carries with it."""
     # the package is not imported for the sake of one of its files
     package = find_spec("plotly")
     assert package
@@ -106,8 +107,9 @@ def _plotly_script() -> str:
     return (Path(package.origin).parent / "package_data" / "plotly.min.js").read_text(encoding="utf-8")
 
 
-def _template() -> Any:
+def template(name: str) -> Any:
+    """Return a template of this folder."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("polyins", "report")
-    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template("report.html.j2")
+    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template(name)

@@ -1,0 +1,154 @@
+"""Where an IMU rests, and its rates and forces there: what its noise can be told from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polyins.errors import InputError
+from polyins.model.recording import ImuStream
+from polyins.model.rig import DEG
+from polyins.prepare.alignment import (
+    STILL_FORCE,
+    STILL_RATE,
+    feels_gravity,
+    hardly_turns,
+    second_spreads,
+    still_seconds,
+)
+from polyins.prepare.timesync import GAP, Aligned
+
+Array = NDArray[np.float64]
+
+SHORTEST_S = 10.0
+"""s at rest of a stretch that is used"""
+LONGEST_PAUSE_S = 1.0
+"""s: the samples around a pause that long still follow each other; a longer one ends the stretch"""
+SETTLING_S = 1.0
+"""s left out after and before motion"""
+BIAS_M_S2 = 1.0
+"""by which the force at rest may differ from gravity"""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rates and forces of one IMU at rest, sample after sample."""
+
+    begin: float
+    """s"""
+    end: float
+    values: Array
+    """rad/s and m/s^2, shape (n, 6)"""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """All stretches of one IMU, on its own samples."""
+
+    name: str
+    interval: float
+    """s, between samples"""
+    stretches: tuple[Stretch, ...]
+    recorded_s: float
+    """in which it measured at all"""
+    closeness: float
+    """how near its own noise comes to what is taken for motion; beyond a half the quiet seconds are picked"""
+
+    @property
+    def used_s(self) -> float:
+        """How long the stretches are together."""
+        return float(sum(len(one.values) for one in self.stretches)) * self.interval
+
+    @property
+    def longest_s(self) -> float:
+        """The longest of them."""
+        return max(len(one.values) for one in self.stretches) * self.interval
+
+    def repeated(self) -> Array:
+        """Return which share of samples are as the one before, (6,)."""
+        same = sum(np.sum(one.values[1:] == one.values[:-1], axis=0) for one in self.stretches)
+        return np.asarray(same / sum(len(one.values) - 1 for one in self.stretches))
+
+
+def at_rest(stream: ImuStream) -> Rest:
+    """Find where an IMU rests, by the test that finds the standstill of a start.
+
+    Raises InputError, saying what is missing, if no stretch is long enough.
+    """
+    aligned = Aligned(
+        stream.time,
+        np.concatenate([stream.dtheta, stream.dvel], axis=1)[:, :, None],
+        (),
+        np.zeros((len(stream.time), 1), bool),
+    )
+    intervals = resting_intervals(aligned)
+    if not intervals:
+        raise InputError(f"IMU {stream.name}: {_lacking(aligned)}")
+    steps = np.diff(stream.time)
+    interval = float(np.mean(steps[steps <= GAP * np.median(steps)]))
+    values = _rates(stream, interval)
+    stretches = []
+    for begin, end in intervals:
+        rows = slice(*np.searchsorted(stream.time, [begin, np.nextafter(end, np.inf)]))
+        stretches.append(Stretch(begin, end, values[rows]))
+    edges, spread = second_spreads(aligned)
+    inside = np.zeros(len(spread), bool)
+    for begin, end in intervals:
+        inside |= (edges[:-1] >= begin) & (edges[1:] <= end)
+    shares = np.median(spread[inside], axis=0) / np.repeat([STILL_RATE, STILL_FORCE], 3)
+    return Rest(stream.name, interval, tuple(stretches), len(stream.time) * interval, float(shares.max()))
+
+
+def resting_intervals(aligned: Aligned) -> list[tuple[float, float]]:
+    """Return where all IMUs rest for ten seconds at least, s, without what is next to motion or a pause."""
+    edges, still = still_seconds(aligned)
+    pauses = aligned.time[:-1][np.diff(aligned.time) > LONGEST_PAUSE_S]
+    whole = still.copy()
+    for pause in pauses:
+        whole[(edges[:-1] <= pause + 1e-9) & (edges[1:] > pause)] = False
+    runs = np.flatnonzero(np.diff(np.concatenate([[0], whole.astype(int), [0]])))
+    found = []
+    for first, last in zip(runs[::2], runs[1::2], strict=True):
+        begin = edges[first] + (SETTLING_S if first > 0 else 0.0)
+        end = edges[last] - (SETTLING_S if last < len(whole) else 0.0)
+        if end - begin >= SHORTEST_S and _level(aligned, float(begin), float(end)):
+            found.append((float(begin), float(end)))
+    return found
+
+
+def _level(aligned: Aligned, begin: float, end: float) -> bool:
+    return feels_gravity(aligned, begin, end, BIAS_M_S2) and hardly_turns(aligned, begin, end)
+
+
+def _rates(stream: ImuStream, interval: float) -> Array:
+    """Return increments over time, (T, 6), by the interval that makes them shake less.
+
+    Of a file of rates each was multiplied by its own interval; where stamps jitter and samples do not, or of a file of
+    increments, by the usual one.
+    """
+    own = np.diff(stream.time, prepend=stream.time[0] - interval)
+    own = np.where(own > LONGEST_PAUSE_S, interval, own)
+    columns = []
+    for increments in (stream.dtheta, stream.dvel):
+        each = [increments / own[:, None], increments / interval]
+        shaken = [float(np.median(np.abs(np.diff(one, 2, axis=0)), axis=0).sum()) for one in each]
+        columns.append(each[int(shaken[1] < shaken[0])])
+    return np.hstack(columns)
+
+
+def _lacking(aligned: Aligned) -> str:
+    """Say why there is no stretch at rest."""
+    edges, spread = second_spreads(aligned)
+    if not len(spread):
+        return f"measures for {aligned.time[-1] - aligned.time[0]:.1f} s; expected {SHORTEST_S:.0f} s at rest, better an hour"
+    still = still_seconds(aligned)[1]
+    runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
+    longest = int(np.max(runs[1::2] - runs[::2])) if still.any() else 0
+    quietest = np.min([spread[:, :3].max(axis=1) / DEG, spread[:, 3:].max(axis=1)], axis=1)
+    return (
+        f"never rests for {SHORTEST_S:.0f} s: the longest rest is of {longest} s; in the quietest second tenths differ by "
+        f"{quietest[0]:.2g} deg/s and {quietest[1]:.2g} m/s^2, at rest by less than {STILL_RATE / DEG:.2g} and "
+        f"{STILL_FORCE:.2g}; expected it left alone, better for an hour, away from engines and fans"
+    )
