@@ -50,6 +50,8 @@ LOWEST_CUT = 1.0 / 64.0
 
 LEAST_SHARE = 1e-6
 """of an estimate squared: what may be that small is not told from zero"""
+ROOT = 1e-4
+"""relative accuracy of the ends of an interval, squared"""
 
 WHITE, FLICKER, WALK = range(3)
 
@@ -227,19 +229,22 @@ class Spectrum:
         return float(np.sum(0.5 * self.count * (ratio - 1.0) ** 2) / max(len(ratio) - 3, 1))
 
     def _interval(self, i: int, best: Array, level: float) -> Coefficient:
-        def beyond(square: float) -> float:
-            return self.deviance(self.maximum((i, square))) - level
+        """Return the root of an estimate, and where the deviance with all others free reaches a level."""
 
-        start = max(float(best[i]), 1e-6 * float(self._scale()[i]))
-        high = start
-        while beyond(high) < 0.0:
-            high *= 4.0
-        high = float(brentq(beyond, 0.25 * high if high > start else start, high, rtol=1e-4)) if high > start else high
-        low, least = 0.0, LEAST_SHARE * float(best[i])
-        if best[i] > 0.0 and beyond(least) > 0.0:
-            low = float(brentq(beyond, least, float(best[i]), rtol=1e-4))
-        value = float(np.sqrt(best[i])) if low > 0.0 else None
-        return Coefficient(value, float(np.sqrt(low)), float(np.sqrt(high)))
+        def beyond(share: float) -> float:
+            return self.deviance(self.maximum((i, share * start))) - level
+
+        # what is not there is looked for from a small part of all power on
+        start = max(float(best[i]), LEAST_SHARE * float(self._scale()[i]))
+        most = 2.0
+        while beyond(most) < 0.0:
+            most *= 4.0
+        high = float(brentq(beyond, 1.0, most, rtol=ROOT)) if beyond(1.0) < 0.0 else 1.0
+        low = 0.0
+        if best[i] == start and beyond(LEAST_SHARE) > 0.0:
+            low = float(brentq(beyond, LEAST_SHARE, 1.0, rtol=ROOT))
+        value = float(np.sqrt(start)) if low > 0.0 else None
+        return Coefficient(value, float(np.sqrt(low * start)), float(np.sqrt(high * start)))
 
 
 def _binned(rate: Array, interval: float) -> tuple[Array, ...]:

@@ -13,7 +13,6 @@ from polyins.model.rig import DEG
 from polyins.prepare.alignment import (
     STILL_FORCE,
     STILL_RATE,
-    feels_gravity,
     hardly_turns,
     second_spreads,
     still_seconds,
@@ -28,8 +27,6 @@ LONGEST_PAUSE_S = 1.0
 """s: the samples around a pause that long still follow each other; a longer one ends the stretch"""
 SETTLING_S = 1.0
 """s left out after and before motion"""
-BIAS_M_S2 = 1.0
-"""by which the force at rest may differ from gravity"""
 
 
 @dataclass(frozen=True)
@@ -113,13 +110,9 @@ def resting_intervals(aligned: Aligned) -> list[tuple[float, float]]:
     for first, last in zip(runs[::2], runs[1::2], strict=True):
         begin = edges[first] + (SETTLING_S if first > 0 else 0.0)
         end = edges[last] - (SETTLING_S if last < len(whole) else 0.0)
-        if end - begin >= SHORTEST_S and _level(aligned, float(begin), float(end)):
+        if end - begin >= SHORTEST_S and hardly_turns(aligned, float(begin), float(end)):
             found.append((float(begin), float(end)))
     return found
-
-
-def _level(aligned: Aligned, begin: float, end: float) -> bool:
-    return feels_gravity(aligned, begin, end, BIAS_M_S2) and hardly_turns(aligned, begin, end)
 
 
 def _rates(stream: ImuStream, interval: float) -> Array:
@@ -146,9 +139,9 @@ def _lacking(aligned: Aligned) -> str:
     still = still_seconds(aligned)[1]
     runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     longest = int(np.max(runs[1::2] - runs[::2])) if still.any() else 0
-    quietest = np.min([spread[:, :3].max(axis=1) / DEG, spread[:, 3:].max(axis=1)], axis=1)
+    rate, force = (float(spread[:, columns].max(axis=1).min()) for columns in (slice(0, 3), slice(3, 6)))
     return (
-        f"never rests for {SHORTEST_S:.0f} s: the longest rest is of {longest} s; in the quietest second tenths differ by "
-        f"{quietest[0]:.2g} deg/s and {quietest[1]:.2g} m/s^2, at rest by less than {STILL_RATE / DEG:.2g} and "
-        f"{STILL_FORCE:.2g}; expected it left alone, better for an hour, away from engines and fans"
+        f"never rests for {SHORTEST_S:.0f} s without turning: nothing shakes for {longest} s at most; in the quietest"
+        f" second tenths differ by {rate / DEG:.2g} deg/s and {force:.2g} m/s^2, at rest by less than {STILL_RATE / DEG:.2g}"
+        f" and {STILL_FORCE:.2g}; expected it left alone, better for an hour, away from engines and fans"
     )
