@@ -623,10 +623,38 @@ def grades() -> str:
     return "\n".join([*header, *rows])
 
 
+def known_imus() -> str:
+    rows = []
+    for name, imu in config.KNOWN_IMUS.items():
+        figures = [
+            f"{imu.figures[key].value:g} ({imu.figures[key].number:g} {imu.figures[key].unit})"
+            if key in imu.figures
+            else ""
+            for key in KEYS_OF_IMUS
+        ]
+        sources = "; ".join(dict.fromkeys(one.source for one in imu.figures.values()))
+        rows.append(f"| `{name}` | {imu.title} | {' | '.join(figures)} | `{imu.grade}` | {sources} |")
+    header = [
+        "### Common IMUs\n",
+        f"| | | {' | '.join(f'`{key}`' for key in KEYS_OF_IMUS)} | the rest | source |",
+        "|---|---|" + "---|" * len(KEYS_OF_IMUS) + "---|---|",
+    ]
+    return "\n".join([*header, *rows])
+
+
+KEYS_OF_IMUS = (
+    "angle_random_walk_deg_sqrt_h",
+    "velocity_random_walk_m_s_sqrt_h",
+    "gyro_bias_deg_h",
+    "accel_bias_mgal",
+    "correlation_time_h",
+)
+
+
 def with_tables(text: str) -> str:
     """Return the reference with its tables of keys as the models have them."""
     parts = {
-        "keys": [*(table(title, model) for title, model in CONFIGURATION.items()), grades()],
+        "keys": [*(table(title, model) for title, model in CONFIGURATION.items()), grades(), known_imus()],
         "scenario keys": [table(title, model) for title, model in SCENARIO.items()],
     }
     for name, tables in parts.items():

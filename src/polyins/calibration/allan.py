@@ -78,7 +78,7 @@ def curve(stretches: Sequence[Array], interval: float, squares: Array) -> AllanC
     freedom = np.array([degrees_of_freedom(int(m), lengths, interval, squares) for m in of])
     low = deviation * np.sqrt(freedom / chi2.ppf(0.975, freedom))
     high = deviation * np.sqrt(freedom / chi2.ppf(0.025, freedom))
-    return AllanCurve(of * interval, deviation, low, high)
+    return AllanCurve(np.asarray(of * interval, float), deviation, low, high)
 
 
 def degrees_of_freedom(m: int, lengths: Sequence[int], interval: float, squares: Array) -> float:
@@ -89,7 +89,7 @@ def degrees_of_freedom(m: int, lengths: Sequence[int], interval: float, squares:
     terms = np.array([n + 1 - 2 * m for n in lengths if n + 1 > 2 * m], dtype=float)
     step = max(1, m // STEPS)
     lags = np.arange(0, min(int(terms.max()), AROUND * m + 1), step)
-    square = _covariance(lags * interval, m * interval, squares) ** 2
+    square = _covariance(np.asarray(lags * interval, float), m * interval, squares) ** 2
     weight = np.where(lags == 0, 1.0, 2.0) * step
     weight[0] = float(step)
     remaining = np.maximum(terms[:, None] - lags, 0.0).sum(axis=0)

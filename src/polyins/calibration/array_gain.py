@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from polyins.calibration.allan import degrees_of_freedom, factors, variances
 from polyins.calibration.noise_model import fit
-from polyins.calibration.rest import resting_intervals
+from polyins.calibration.rest import rates_of, resting_intervals
 from polyins.errors import InputError
-from polyins.model.recording import ImuStream
-from polyins.prepare.timesync import align, usual_interval
+from polyins.model.recording import ImuStream, usual_interval
+from polyins.prepare.timesync import align
 
 Array = NDArray[np.float64]
 
@@ -76,17 +76,14 @@ def array_gain(streams: tuple[ImuStream, ...]) -> ArrayGain:
     Raises InputError if they never rest together for ten seconds.
     """
     aligned = align(streams, bridge=False)
-    together = ~aligned.missing.any(axis=1)
+    interval = usual_interval(aligned.time)
+    rates = rates_of(aligned.time, aligned.increments, interval)
     parts = []
     for begin, end in resting_intervals(aligned):
         first, last = np.searchsorted(aligned.time, [begin, np.nextafter(end, np.inf)])
-        # the first sample may be of motion
-        rows = slice(first + 1, last)
-        if together[rows].all():
-            parts.append(aligned.increments[rows] * aligned.rate_hz)
+        parts.append(rates[first:last])
     if not parts:
         raise InputError("imus: do not rest together for 10 s; expected one recording of all of them at rest")
-    interval = usual_interval(aligned.time)
     alike = all(np.array_equal(one.time, aligned.time) for one in streams)
     of = factors([len(one) for one in parts])
     of = of if alike else of[of >= RESAMPLED]
@@ -112,4 +109,4 @@ def _sensor(parts: list[Array], of: NDArray[np.intp], interval: float, columns: 
     relative = 0.5 * np.sqrt(spread * (1.0 + 1.0 / count)) / mean
     gain = np.sqrt(single / mean)
     low, high = gain * np.exp(-NORMAL_95 * relative), gain * np.exp(NORMAL_95 * relative)
-    return SensorGain(of * interval, np.sqrt(single / 3.0), np.sqrt(mean / 3.0), low, high, count)
+    return SensorGain(np.asarray(of * interval, float), np.sqrt(single / 3.0), np.sqrt(mean / 3.0), low, high, count)

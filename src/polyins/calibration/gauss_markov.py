@@ -19,7 +19,7 @@ from polyins.calibration.noise_model import WHITE, allan_variance_of
 Array = NDArray[np.float64]
 
 CORRELATION_TIME_S = 3600.0
-TIMES = 60
+TIMES = 400
 """at which the Allan variances are compared"""
 
 
@@ -35,4 +35,4 @@ def drift_std(squares: Array, longest: float) -> float:
 def unit_variance(u: Array) -> Array:
     """Return the Allan variance of a process of std one at averaging times over its correlation time."""
     exact = 2.0 / u - (3.0 - 4.0 * np.exp(-u) + np.exp(-2.0 * u)) / u**2
-    return np.asarray(np.where(u < 1e-2, 2.0 * u / 3.0, exact))
+    return np.asarray(np.where(u < 1e-2, u * (2.0 / 3.0 - u / 2.0), exact))

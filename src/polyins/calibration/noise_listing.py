@@ -33,12 +33,19 @@ FIGURES: dict[Sensor, tuple[Figure, Figure, Figure]] = {
     "gyro": (
         Figure("angle_random_walk_rad_sqrt_s", "angle_random_walk_deg_sqrt_h", "deg/sqrt(h)", DEG / ROOT_HOUR),
         Figure("bias_instability_rad_s", "bias_instability_deg_h", "deg/h", DEG / HOUR),
-        Figure("rate_random_walk_rad_s_sqrt_s", "rate_random_walk_deg_h_sqrt_h", "deg/h/sqrt(h)", DEG / HOUR / ROOT_HOUR),
+        Figure(
+            "rate_random_walk_rad_s_sqrt_s", "rate_random_walk_deg_h_sqrt_h", "deg/h/sqrt(h)", DEG / HOUR / ROOT_HOUR
+        ),
     ),
     "accel": (
         Figure("velocity_random_walk_m_s_sqrt_s", "velocity_random_walk_m_s_sqrt_h", "m/s/sqrt(h)", 1.0 / ROOT_HOUR),
         Figure("bias_instability_m_s2", "bias_instability_mgal", "mGal", MGAL),
-        Figure("acceleration_random_walk_m_s2_sqrt_s", "acceleration_random_walk_mgal_sqrt_h", "mGal/sqrt(h)", MGAL / ROOT_HOUR),
+        Figure(
+            "acceleration_random_walk_m_s2_sqrt_s",
+            "acceleration_random_walk_mgal_sqrt_h",
+            "mGal/sqrt(h)",
+            MGAL / ROOT_HOUR,
+        ),
     ),
 }
 RATE_UNITS: dict[Sensor, str] = {"gyro": "rad_s", "accel": "m_s2"}
@@ -161,13 +168,13 @@ def sentences(array: ArrayGain) -> list[str]:
     """Say what an array gains."""
     found = []
     for name, of in (("gyros", array.gyro), ("accelerometers", array.accel)):
-        row, last = of.at(AT_S), len(of.tau) - 1
-        found.append(
-            f"the mean of {array.imus} {name}: {of.gain[row]:.2f} ({of.low[row]:.2f} to {of.high[row]:.2f}) times less noise"
-            f" than one at {of.tau[row]:.2g} s, {of.gain[last]:.2f} ({of.low[last]:.2f} to {of.high[last]:.2f}) at"
-            f" {of.tau[last]:.2g} s; sqrt(N) = {array.imus**0.5:.2f}; in common {100 * of.common_share[row]:.0f} % and"
-            f" {100 * of.common_share[last]:.0f} % of the variance"
-        )
+        parts = [
+            f"{of.gain[row]:.2f} ({of.low[row]:.2f} to {of.high[row]:.2f}) times at {of.tau[row]:.2g} s, where"
+            f" {100 * of.common_share[row]:.0f} % of the variance is common"
+            for row in dict.fromkeys([of.at(AT_S), len(of.tau) - 1])
+        ]
+        begin = f"the mean of {array.imus} {name} has less noise than one of them"
+        found.append(f"{begin}: {'; '.join(parts)}; sqrt(N) = {array.imus**0.5:.2f}")
     return found
 
 
@@ -177,7 +184,9 @@ def configuration(figures: NoiseFigures) -> str:
     for one in figures.imus:
         lines += [f"  - name: {one.rest.name}", "    noise:", f"      grade: {USUAL_GRADE}  # what is not said below"]
         for key, value in one.configuration().items():
-            lines.append(f"      {key}: {value:g}" if value is not None else f"      # {key}: not told by this recording")
+            lines.append(
+                f"      {key}: {value:g}" if value is not None else f"      # {key}: not told by this recording"
+            )
     return "\n".join(lines) + "\n"
 
 

@@ -7,8 +7,8 @@ A gyro at rest shows a rate of two-sided spectral density (IEEE Std 952, annex C
 with the angle random walk N, the bias instability B and the rate random walk K; an accelerometer likewise. The cosine
 transform of a stretch turns samples into coefficients of which that of the mean is left out; the others do not depend
 on each other, exactly so for white noise and random walk, and nearly so for flicker. Their variances are linear in N^2,
-B^2 and K^2, so that their likelihood is a sum over frequencies, and no estimate is counted twice, as neighbouring values
-of an Allan deviation are. Intervals are where the profile of the likelihood is within the quantile of chi^2.
+B^2 and K^2, so that their likelihood is a sum over frequencies, and nothing is counted twice, as neighbouring values of
+an Allan deviation would be. Intervals are where the profile of the likelihood is within the quantile of chi^2.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
-from scipy.ndimage import median_filter
 from scipy.linalg import cholesky, solve_triangular
+from scipy.ndimage import median_filter
 from scipy.optimize import brentq, nnls
 from scipy.special import sici, zeta
 from scipy.stats import chi2
@@ -123,9 +123,15 @@ class Spectrum:
     @classmethod
     def of(cls, stretches: Sequence[Array], interval: float) -> Spectrum:
         """Transform stretches of rates."""
-        parts = [_binned(one, interval) for one in stretches if len(one) >= FEWEST]
-        angle, power, count, basis, line = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return cls(angle, power, count, basis, line, interval)
+        parts = [_of_stretch(one, interval) for one in stretches if len(one) >= FEWEST]
+        return cls(
+            np.concatenate([one.angle for one in parts]),
+            np.concatenate([one.power for one in parts]),
+            np.concatenate([one.count for one in parts]),
+            np.concatenate([one.basis for one in parts]),
+            np.concatenate([one.line for one in parts]),
+            interval,
+        )
 
     def lines(self) -> tuple[float, ...]:
         """Return the frequencies of lines, Hz, the strongest first."""
@@ -141,8 +147,8 @@ class Spectrum:
         return self._at(self.angle <= share * np.pi)
 
     def _at(self, kept: NDArray[np.bool_]) -> Spectrum:
-        of = (each[kept] for each in (self.angle, self.power, self.count, self.basis, self.line))
-        return Spectrum(*of, self.interval)
+        angle, power, count = self.angle[kept], self.power[kept], self.count[kept]
+        return Spectrum(angle, power, count, self.basis[kept], self.line[kept], self.interval)
 
     def fitting(self) -> Spectrum:
         """Leave out high frequencies, octave by octave, while those in the upper half are not as the rest says."""
@@ -219,9 +225,9 @@ class Spectrum:
         best = self.maximum()
         least, excess = self.deviance(best), self._excess(best)
         allowed = WITHIN_95 * max(1.0, excess)
-        found = [self._interval(i, best, least + allowed) for i in range(3)]
+        white, flicker, walk = (self._interval(i, best, least + allowed) for i in range(3))
         up_to = float(self.angle.max()) / (2.0 * np.pi * self.interval)
-        return RateNoise(*found, best=best, up_to_hz=up_to, lines_hz=(), excess=excess)
+        return RateNoise(white, flicker, walk, best=best, up_to_hz=up_to, lines_hz=(), excess=excess)
 
     def _excess(self, squares: Array) -> float:
         """Return Pearson's chi^2 over its expectation."""
@@ -247,8 +253,8 @@ class Spectrum:
         return Coefficient(value, float(np.sqrt(low * start)), float(np.sqrt(high * start)))
 
 
-def _binned(rate: Array, interval: float) -> tuple[Array, ...]:
-    """Return angle, mean square, count, basis and whether it is a line, of the bins of one stretch."""
+def _of_stretch(rate: Array, interval: float) -> Spectrum:
+    """Return the bins of one stretch."""
     n = len(rate)
     squares = dct(rate - rate.mean(), norm="ortho")[1:] ** 2
     # the lowest ones by themselves, then ever wider bins
@@ -261,7 +267,7 @@ def _binned(rate: Array, interval: float) -> tuple[Array, ...]:
     power = np.add.reduceat(squares, begin) / count
     order = begin + 0.5 * (count + 1.0)
     angle = np.pi * order / n
-    return angle, power, count, _basis(order, angle, interval), _stands_out(power, count)
+    return Spectrum(angle, power, count, _basis(order, angle, interval), _stands_out(power, count), interval)
 
 
 def _stands_out(power: Array, count: Array) -> NDArray[np.bool_]:

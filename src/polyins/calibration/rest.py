@@ -74,18 +74,14 @@ def at_rest(stream: ImuStream) -> Rest:
 
     Raises InputError, saying what is missing, if no stretch is long enough.
     """
-    aligned = Aligned(
-        stream.time,
-        np.concatenate([stream.dtheta, stream.dvel], axis=1)[:, :, None],
-        (),
-        np.zeros((len(stream.time), 1), bool),
-    )
+    increments = np.concatenate([stream.dtheta, stream.dvel], axis=1)
+    aligned = Aligned(stream.time, increments[:, :, None], (), np.zeros((len(stream.time), 1), bool))
     intervals = resting_intervals(aligned)
     if not intervals:
         raise InputError(f"IMU {stream.name}: {_lacking(aligned)}")
     steps = np.diff(stream.time)
     interval = float(np.mean(steps[steps <= GAP * np.median(steps)]))
-    values = _rates(stream, interval)
+    values = rates_of(stream.time, increments, interval)
     stretches = []
     for begin, end in intervals:
         rows = slice(*np.searchsorted(stream.time, [begin, np.nextafter(end, np.inf)]))
@@ -99,12 +95,12 @@ def at_rest(stream: ImuStream) -> Rest:
 
 
 def resting_intervals(aligned: Aligned) -> list[tuple[float, float]]:
-    """Return where all IMUs rest for ten seconds at least, s, without what is next to motion or a pause."""
+    """Return where all IMUs measure and rest for ten seconds at least, s, without what is next to motion or a pause."""
     edges, still = still_seconds(aligned)
-    pauses = aligned.time[:-1][np.diff(aligned.time) > LONGEST_PAUSE_S]
+    broken = aligned.missing.any(axis=1) | (np.diff(aligned.time, append=aligned.time[-1]) > LONGEST_PAUSE_S)
+    second = np.searchsorted(edges, aligned.time[broken], "right") - 1
     whole = still.copy()
-    for pause in pauses:
-        whole[(edges[:-1] <= pause + 1e-9) & (edges[1:] > pause)] = False
+    whole[second[second < len(whole)]] = False
     runs = np.flatnonzero(np.diff(np.concatenate([[0], whole.astype(int), [0]])))
     found = []
     for first, last in zip(runs[::2], runs[1::2], strict=True):
@@ -115,33 +111,34 @@ def resting_intervals(aligned: Aligned) -> list[tuple[float, float]]:
     return found
 
 
-def _rates(stream: ImuStream, interval: float) -> Array:
-    """Return increments over time, (T, 6), by the interval that makes them shake less.
+def rates_of(time: Array, increments: Array, interval: float) -> Array:
+    """Return increments over time, (T, 6, ...), of gyros and accelerometers each by the interval that shakes them less.
 
     Of a file of rates each was multiplied by its own interval; where stamps jitter and samples do not, or of a file of
     increments, by the usual one.
     """
-    own = np.diff(stream.time, prepend=stream.time[0] - interval)
-    own = np.where(own > LONGEST_PAUSE_S, interval, own)
-    columns = []
-    for increments in (stream.dtheta, stream.dvel):
-        each = [increments / own[:, None], increments / interval]
+    own = np.diff(time, prepend=time[0] - interval)
+    own = np.where(own > LONGEST_PAUSE_S, interval, own).reshape(-1, *[1] * (increments.ndim - 1))
+    found = np.empty_like(increments)
+    for columns in (slice(0, 3), slice(3, 6)):
+        each = [increments[:, columns] / own, increments[:, columns] / interval]
         shaken = [float(np.median(np.abs(np.diff(one, 2, axis=0)), axis=0).sum()) for one in each]
-        columns.append(each[int(shaken[1] < shaken[0])])
-    return np.hstack(columns)
+        found[:, columns] = each[int(shaken[1] < shaken[0])]
+    return found
 
 
 def _lacking(aligned: Aligned) -> str:
     """Say why there is no stretch at rest."""
-    edges, spread = second_spreads(aligned)
+    _, spread = second_spreads(aligned)
     if not len(spread):
-        return f"measures for {aligned.time[-1] - aligned.time[0]:.1f} s; expected {SHORTEST_S:.0f} s at rest, better an hour"
+        return f"measures for less than a second; expected {SHORTEST_S:.0f} s at rest, better an hour"
     still = still_seconds(aligned)[1]
     runs = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     longest = int(np.max(runs[1::2] - runs[::2])) if still.any() else 0
     rate, force = (float(spread[:, columns].max(axis=1).min()) for columns in (slice(0, 3), slice(3, 6)))
     return (
         f"never rests for {SHORTEST_S:.0f} s without turning: nothing shakes for {longest} s at most; in the quietest"
-        f" second tenths differ by {rate / DEG:.2g} deg/s and {force:.2g} m/s^2, at rest by less than {STILL_RATE / DEG:.2g}"
-        f" and {STILL_FORCE:.2g}; expected it left alone, better for an hour, away from engines and fans"
+        f" second tenths differ by {rate / DEG:.2g} deg/s and {force:.2g} m/s^2, at rest by less than"
+        f" {STILL_RATE / DEG:.2g} and {STILL_FORCE:.2g}; expected it left alone, better for an hour, away from engines"
+        " and fans"
     )

@@ -20,13 +20,16 @@ from polyins.config.columns import (
 )
 from polyins.config.fields import NotNegative, Number, Pair, PerAxis, Positive, PositiveSpread, Section, Spread, Triple
 from polyins.config.file import Config, Filter, Standstill, parse, validated
-from polyins.config.imu import NOISE_GRADES, ImuEntry, ImuSettings, InitialErrors, InitialStd, Noise
+from polyins.config.imu import NOISE_BY_NAME, NOISE_GRADES, ImuEntry, ImuSettings, InitialErrors, InitialStd, Noise
 from polyins.config.positions import GeodeticPoint, GnssEntry, ReferenceEntry
 from polyins.config.rolling import Rolling, SpinAxis, WheelEntry
+from polyins.config.sensor_noise import KNOWN_IMUS
 from polyins.config.sensors import HeadingEntry, HeightEntry, OdometerEntry, SensorColumns, SensorEntry
 from polyins.config.timing import Outages, OutageSchedule, StartEntry, StartPosition
 
 __all__ = [
+    "KNOWN_IMUS",
+    "NOISE_BY_NAME",
     "NOISE_GRADES",
     "AccelColumns",
     "AttitudeColumns",

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from polyins.config.columns import ImuColumns
 from polyins.config.fields import ORIGIN, NotNegative, Number, PerAxis, Positive, Section, Spread, Triple, blame
 from polyins.config.rolling import WheelEntry
+from polyins.config.sensor_noise import KNOWN_IMUS
 
 NOISE_GRADES: dict[str, dict[str, float]] = {
     "consumer-mems": {
@@ -42,6 +43,12 @@ NOISE_GRADES: dict[str, dict[str, float]] = {
 }
 """Typical figures by class of sensor. The first is an ICM-20602 as in the enav-fusion paper's public settings."""
 
+NOISE_BY_NAME: dict[str, dict[str, float]] = NOISE_GRADES | {
+    name: NOISE_GRADES[imu.grade] | {key: stated.value for key, stated in imu.figures.items()}
+    for name, imu in KNOWN_IMUS.items()
+}
+"""What `noise` may be by name: a grade, or an IMU whose figures have a source."""
+
 FORWARD_RIGHT_DOWN = ("x", "y", "z")
 
 
@@ -57,8 +64,9 @@ class Noise(Section):
     FIELDS: ClassVar[Mapping[str, str]] = {
         name: f"{name}_std" for name in ("gyro_bias", "accel_bias", "gyro_scale", "accel_scale")
     }
-    grade: Literal["consumer-mems", "industrial-mems", "tactical"] | None = None
-    """fills in what is not given below; without it consumer-mems does"""
+    grade: str | None = None
+    """fills in what is not given below: a grade, or a common IMU by name, both listed below; without it consumer-mems
+    does"""
     angle_random_walk_deg_sqrt_h: Spread
     """deg/sqrt(h); the larger, the faster the attitude becomes unsure, and the more aids weigh"""
     velocity_random_walk_m_s_sqrt_h: Spread
@@ -79,12 +87,12 @@ class Noise(Section):
     def _fill_from_grade(cls, values: Any) -> Any:
         given = {"grade": values} if isinstance(values, str) else values
         if not isinstance(given, dict):
-            raise ValueError(f"expected a mapping or the name of a grade: {', '.join(NOISE_GRADES)}")
+            raise ValueError(f"expected a mapping or a name: {', '.join(NOISE_BY_NAME)}")
         grade = given.get("grade")
-        if grade is not None and grade not in NOISE_GRADES:
-            raise ValueError(f"unknown grade {grade!r}; expected one of {', '.join(NOISE_GRADES)}")
+        if grade is not None and (not isinstance(grade, str) or grade not in NOISE_BY_NAME):
+            raise ValueError(f"unknown grade {grade!r}; expected one of {', '.join(NOISE_BY_NAME)}")
         said = {key: value for key, value in given.items() if value is not None}
-        return {"grade": None, **NOISE_GRADES[grade or "consumer-mems"], **said}
+        return {"grade": None, **NOISE_BY_NAME[grade or "consumer-mems"], **said}
 
 
 class InitialErrors(Section):
@@ -144,7 +152,7 @@ class ImuSettings(Section):
     """of pitch and yaw on a vehicle's body, deg; above zero the filter estimates them; the larger, the faster they
     leave mount_deg"""
     noise: Noise = Field(default_factory=lambda: Noise.model_validate("consumer-mems"))
-    """how good the sensor is: a mapping, or just the name of a grade"""
+    """how good the sensor is: a mapping, or just the name of a grade or of a common IMU"""
     initial_errors: InitialErrors = InitialErrors()
     """slow errors known beforehand"""
     initial_std: InitialStd = InitialStd()

@@ -39,6 +39,16 @@ DATASETS = {
         licence="made for polyins",
         source="POLYINS_DATA",
     ),
+    "mimu4444": Dataset(
+        summary="a board of eight MPU-9150 in 20 poses at rest of 25 s, then turned fast by hand, 62.5 Hz",
+        licence="MIT",
+        source="https://github.com/hcarlsso/Self-Calibration-Inertial-Sensor-Arrays-BCD.jl",
+    ),
+    "logs": Dataset(
+        summary="logs of autopilots, receivers and arrays in their own formats",
+        licence="see its README",
+        source="POLYINS_DATA",
+    ),
     "wid": Dataset(
         summary="a car with Xsens DOT on its four wheels and its body, 120 Hz, and its RTK position, 5 Hz",
         licence="see the source",

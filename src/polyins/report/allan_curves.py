@@ -15,7 +15,10 @@ from polyins.report.figure import Figure, Trace, panels, scatter
 from polyins.report.palette import REFERENCE, imu_colours, transparent
 from polyins.report.style import finish
 
-ROWS: tuple[tuple[Sensor, str, float], ...] = (("gyro", "gyro (deg/h)", DEG / HOUR), ("accel", "accelerometer (mGal)", MGAL))
+ROWS: tuple[tuple[Sensor, str, float], ...] = (
+    ("gyro", "gyro (deg/h)", DEG / HOUR),
+    ("accel", "accelerometer (mGal)", MGAL),
+)
 TAU_TITLE = "averaging time (s)"
 FEW = 4
 """IMUs whose intervals are drawn"""
@@ -31,13 +34,15 @@ def allan_figure(figures: NoiseFigures) -> Figure:
                 axis, first = one.axes[sensor][column], row == column == 0
                 banded = len(figures.imus) <= FEW
                 figure.add(_traces(one, axis, (unit, colour), first=first, banded=banded), 3 * row + column)
-    for k, axis in enumerate(figure.axes("x")):
+    for k, below in enumerate(figure.axes("x")):
         title = {"title": {"text": TAU_TITLE}} if k >= 3 else {}
-        axis.update(type="log", exponentformat="power", **title)
-    for k, axis in enumerate(figure.axes("y")):
+        below.update(type="log", exponentformat="power", **title)
+    for k, beside in enumerate(figure.axes("y")):
         title = {"title": {"text": ROWS[k // 3][1]}} if k % 3 == 0 else {}
-        axis.update(type="log", exponentformat="power", **title)
-    figure.update_layout(annotations=[_heading(name, axis["domain"]) for name, axis in zip(AXES, figure.axes("x"), strict=False)])
+        beside.update(type="log", exponentformat="power", **title)
+    figure.update_layout(
+        annotations=[_heading(name, axis["domain"]) for name, axis in zip(AXES, figure.axes("x"), strict=False)]
+    )
     return finish(figure, height=760)
 
 
@@ -103,7 +108,14 @@ def _gains(name: str, of: SensorGain, colour: str) -> list[Trace]:
     line = {"color": colour, "width": 1.8}
     hover = "%{y:.2f} at %{x:.3g} s"
     curve = scatter(
-        x=of.tau, y=of.gain, name=name, legendgroup=name, mode="lines+markers", marker={"size": 4}, line=line, hovertemplate=hover
+        x=of.tau,
+        y=of.gain,
+        name=name,
+        legendgroup=name,
+        mode="lines+markers",
+        marker={"size": 4},
+        line=line,
+        hovertemplate=hover,
     )
     return [_band(of.tau, of.low, of.high, (name, colour)), curve]
 

@@ -163,7 +163,7 @@ class Scenario(Section):
     wheels: tuple[WheelModule, ...] = ()
     """the modules on wheels; with them the drive is over ground that does not twist, so that no wheel skids"""
     noise: Noise = Field(default_factory=lambda: Noise.model_validate("consumer-mems"))
-    """how good the IMUs are: a mapping, or just the name of a grade"""
+    """how good the IMUs are: a mapping, or just the name of a grade or of a common IMU"""
     filter_noise: Noise | None = None
     """how good the configuration says they are; without it as good as they are"""
     initial_std: InitialStd | None = None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from polyins.calibration.noise_model import fit
 from polyins.errors import InputError
 from polyins.model.recording import ImuStream
 from polyins.reading import datasets
-from polyins.studies.noise_cases import NoiseCase, draw
+from polyins.studies.noise_cases import draw
 from polyins.studies.progress import Steps
 
 Document = dict[str, Any]
@@ -25,9 +24,8 @@ QUICK_SEEDS = 20
 HOURS = (1.0, 6.0)
 SAMPLES = 100_000
 TEN_MINUTES = (1.0 / 6.0, 1.0 / 6.0)
-BOARD_FILES = ("static-120s.bin",)
-MIMU = "mimu4444"
-STREAMED = "mimu4444_exp4.npz"
+MIMU, STREAMED = "mimu4444", "mimu4444_exp4.npz"
+BOARD = "array-binary"
 
 
 def reproduce(quick: bool = False, progress: Callable[[float], None] | None = None) -> Document:
@@ -92,7 +90,7 @@ def _worst(values: np.ndarray) -> float | None:
 def gains(progress: Callable[[float], None]) -> Document:
     """Return what the real arrays of eight gain; null where they are not at hand."""
     found: Document = {}
-    for k, (name, read) in enumerate({MIMU: mimu4444, "array-binary": array_binary}.items(), 1):
+    for k, (name, read) in enumerate({MIMU: mimu4444, BOARD: array_binary}.items(), 1):
         try:
             found[name] = _told(array_gain(read()))
         except InputError:
@@ -102,20 +100,23 @@ def gains(progress: Callable[[float], None]) -> Document:
 
 
 def _told(gain: ArrayGain) -> Document:
-    return {
-        name: {key: float(values[of.at(AT_S)]) for key, values in
-               (("gain", of.gain), ("low", of.low), ("high", of.high), ("common_share", of.common_share))}
-        for name, of in (("gyro", gain.gyro), ("accel", gain.accel))
-    } | {"rest_s": gain.rest_s}  # fmt: skip
+    found: Document = {"rest_s": gain.rest_s}
+    for name, of in (("gyro", gain.gyro), ("accel", gain.accel)):
+        row = of.at(AT_S)
+        figures = {"gain": of.gain, "low": of.low, "high": of.high, "common_share": of.common_share}
+        found[name] = {key: float(values[row]) for key, values in figures.items()}
+    return found
 
 
 def mimu4444() -> tuple[ImuStream, ...]:
     """Return the eight IMUs of the data set; raises InputError where it is not at hand."""
-    data = np.load(_folder(MIMU) / STREAMED)
+    data = np.load(datasets.fetch(MIMU) / STREAMED)
     time = data["t"]
     steps = np.diff(time, prepend=time[0] - float(np.median(np.diff(time))))[:, None]
     return tuple(
-        ImuStream(f"imu{i + 1}", time, data["gyro"][:, i].astype(float) * steps, data["acc"][:, i].astype(float) * steps)
+        ImuStream(
+            f"imu{i + 1}", time, data["gyro"][:, i].astype(float) * steps, data["acc"][:, i].astype(float) * steps
+        )
         for i in range(data["gyro"].shape[1])
     )
 
@@ -125,8 +126,4 @@ def array_binary() -> tuple[ImuStream, ...]:
     from polyins.tools.noise import read_streams
     from polyins.tools.propose.proposal import settings_of
 
-    return read_streams(settings_of((_folder("logs") / "array-binary" / "static-120s.bin",)))[0]
-
-
-def _folder(name: str) -> Path:
-    return datasets.fetch(name)
+    return read_streams(settings_of((datasets.fetch("logs") / BOARD / "static-120s.bin",)))[0]

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from polyins.calibration.array_gain import ArrayGain, array_gain
 from polyins.calibration.imu_noise import ImuNoise, imu_noise
+from polyins.calibration.noise_findings import findings as findings_of
 from polyins.calibration.noise_listing import NoiseFigures, configuration, document
 from polyins.errors import InputError
 from polyins.files import write_bytes
 from polyins.formats.documents import write_document
-from polyins.model.findings import Finding
+from polyins.model.findings import LEFT_OUT, Finding
 from polyins.model.recording import ImuStream
 from polyins.reading.clocks import on_one_clock
 from polyins.reading.imu_stream import ReadImu, read_imu
@@ -40,7 +41,8 @@ def _on_one_clock(settings: Settings, read: list[ReadImu]) -> tuple[ImuStream, .
 def noise_figures(streams: tuple[ImuStream, ...], known: tuple[Finding, ...] = ()) -> NoiseFigures:
     """Return the noise of IMUs, and of their mean where several rest together.
 
-    An IMU that has no rest is named by a finding, after those that are `known` of the data. Raises InputError if none has.
+    An IMU that has no rest is named by a finding, after those that are `known` of the data. Raises InputError if none
+    has.
     """
     told: list[ImuNoise] = []
     refused: list[InputError] = []
@@ -51,10 +53,10 @@ def noise_figures(streams: tuple[ImuStream, ...], known: tuple[Finding, ...] = (
             refused.append(error)
     if not told:
         raise refused[0]
-    findings = [Finding("noise", str(error), "serious") for error in refused]
+    findings = [Finding(LEFT_OUT, str(error), "serious") for error in refused]
     names = {one.rest.name for one in told}
     array, lacking = _of_array(tuple(one for one in streams if one.name in names))
-    of_imus = (finding for one in told for finding in one.findings())
+    of_imus = (finding for one in told for finding in findings_of(one))
     return NoiseFigures(tuple(told), array, (*known, *findings, *lacking, *of_imus))
 
 
