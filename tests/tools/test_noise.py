@@ -15,8 +15,8 @@ from polyins.config.yaml_document import read_yaml
 from polyins.errors import InputError
 
 RATE = 50.0
-WHITE = np.repeat([0.01, 0.004], 3)
-"""density, deg/s and m/s^2, per sqrt(Hz)"""
+WHITE = np.repeat([np.radians(0.01), 0.004], 3)
+"""density, rad/s and m/s^2, per sqrt(Hz)"""
 
 
 def write(path: Path, seconds: float, seed: int, *, moving: tuple[float, float] = (0.0, 0.0)) -> Path:
@@ -24,7 +24,7 @@ def write(path: Path, seconds: float, seed: int, *, moving: tuple[float, float] 
     time = np.arange(1, count + 1) / RATE
     rates = np.random.default_rng(seed).standard_normal((count, 6)) * WHITE * np.sqrt(RATE) + [0, 0, 0, 0, 0, 9.81]
     swing = np.where((time > moving[0]) & (time < moving[1]), np.sin(9.0 * time), 0.0)[:, None]
-    rows = np.column_stack([time, rates + swing * [30.0, 20.0, 10.0, 2.0, 2.0, 2.0]])
+    rows = np.column_stack([time, rates + swing * [0.5, 0.4, 0.2, 2.0, 2.0, 2.0]])
     np.savetxt(path, rows, "%.9g", ",", header="time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z", comments="")
     return path
 

@@ -118,8 +118,8 @@ def _unlike(name: str, each: Each) -> Iterator[Finding]:
         worst = max(unlike.values())
         yield Finding(
             KIND,
-            f"IMU {name}: white noise, flicker and random walk do not describe {', '.join(unlike)}: what is left over has"
-            f" up to {worst:.1f} times their variance, by whose root the intervals are wider",
+            f"IMU {name}: white noise, flicker and random walk do not describe {', '.join(unlike)}: what is left over"
+            f" has up to {worst:.1f} times their variance, by whose root the intervals are wider",
             "doubt",
             stream=name,
             size=worst,

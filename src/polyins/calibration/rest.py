@@ -25,6 +25,8 @@ SHORTEST_S = 10.0
 """s at rest of a stretch that is used"""
 LONGEST_PAUSE_S = 1.0
 """s: the samples around a pause that long still follow each other; a longer one ends the stretch"""
+ALIKE = 1e-9
+"""relative difference of samples that are the same"""
 SETTLING_S = 1.0
 """s left out after and before motion"""
 
@@ -65,7 +67,8 @@ class Rest:
 
     def repeated(self) -> Array:
         """Return which share of samples are as the one before, (6,)."""
-        same = sum(np.sum(one.values[1:] == one.values[:-1], axis=0) for one in self.stretches)
+        # division by intervals leaves them alike to rounding only
+        same = sum(np.sum(np.isclose(one.values[1:], one.values[:-1], ALIKE, 0.0), axis=0) for one in self.stretches)
         return np.asarray(same / sum(len(one.values) - 1 for one in self.stretches))
 
 
