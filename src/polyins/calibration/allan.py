@@ -62,7 +62,9 @@ def variances(stretches: Sequence[Array], of: NDArray[np.intp]) -> Array:
         total, terms = 0.0, 0
         for x in angles:
             if len(x) > 2 * m:
-                bent = x[2 * m :] - 2.0 * x[m:-m] + x[: -2 * m]
+                bent = -2.0 * x[m:-m]
+                bent += x[2 * m :]
+                bent += x[: -2 * m]
                 total += float(bent @ bent)
                 terms += len(bent)
         if terms:
