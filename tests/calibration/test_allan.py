@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import allantools
 import numpy as np
 import pytest
 
 from polyins.calibration.allan import curve, degrees_of_freedom, factors, variances
 from polyins.calibration.noise_model import allan_variance_of
+
+allantools = pytest.importorskip("allantools", reason="allantools is not installed")
 
 RATE_HZ = 50.0
 KINDS = {"white": (0, [1.0, 0.0, 0.0]), "flicker": (-1, [0.0, 1.0, 0.0]), "walk": (-2, [0.0, 0.0, 1.0])}

@@ -10,9 +10,10 @@ from resting import ACCEL, GYRO, INTERVAL, of_rates, shaken, stream
 
 from polyins.calibration.imu_noise import AXES, SENSORS, ImuNoise, imu_noise
 from polyins.calibration.noise_findings import findings
-from polyins.calibration.noise_listing import FIGURES, NoiseFigures, configuration, document, rows
+from polyins.calibration.noise_listing import QUANTITIES, NoiseFigures, configuration, document, rows
 from polyins.config import NOISE_GRADES, Noise
 from polyins.config.units import read
+from polyins.errors import InputError
 from polyins.model.rig import NoiseGrade
 from polyins.studies.noise_cases import NoiseCase
 
@@ -92,7 +93,7 @@ def test_what_is_not_told_is_null_with_its_limit(quiet: ImuNoise) -> None:
     table = rows(figures)
     assert [row[0] for row in table] == [f"left  {sensor} {axis}" for sensor in SENSORS for axis in AXES]
     assert table[0][3].startswith("at most")
-    assert table[0][3].endswith(FIGURES["gyro"][2].unit)
+    assert table[0][3].endswith(QUANTITIES["gyro"][2].unit)
 
 
 def test_what_is_left_out_is_said() -> None:
@@ -130,3 +131,11 @@ def test_steps_are_no_noise_of_the_model() -> None:
     rates[:, 0] += np.where(np.arange(len(rates)) // 250 % 2, 30.0 * GYRO, 0.0)
     doubts = [found.text for found in findings(imu_noise(of_rates("a", rates))) if found.severity == "doubt"]
     assert any("do not describe gyro x:" in text for text in doubts)
+
+
+def test_a_stuck_axis_is_refused() -> None:
+    one = stream("a", 60.0, 7)
+    rates = np.hstack([one.dtheta, one.dvel]) / INTERVAL
+    rates[:, 4] = -0.2
+    with pytest.raises(InputError, match="IMU a: accel y: one value at rest throughout"):
+        imu_noise(of_rates("a", rates))

@@ -5,8 +5,8 @@ difference of neighbouring means (IEEE Std 952; Riley, NIST SP 1065),
 
     sigma^2(tau) = < (x(t + 2 tau) - 2 x(t + tau) + x(t))^2 > / (2 tau^2),
 
-over all t of all stretches; none reaches over the end of one. Terms that overlap depend on each other: what they are
-worth follows from their covariance, which the noise that was fitted has.
+over all t of all stretches; none reaches over the end of one, for which allantools has no function. Terms that overlap
+depend on each other: what they are worth follows from their covariance, which the noise that was fitted has.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from polyins.calibration.gauss_markov import CORRELATION_TIME_S, drift_std
 from polyins.calibration.noise_model import Coefficient, RateNoise, fit
 from polyins.calibration.rest import Rest, at_rest
 from polyins.config import NOISE_GRADES
+from polyins.errors import InputError
 from polyins.model.recording import ImuStream
 from polyins.model.rig import DEG, HOUR, MGAL
 
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 Sensor = Literal["gyro", "accel"]
 SENSORS: tuple[Sensor, ...] = ("gyro", "accel")
 AXES = ("x", "y", "z")
+SIX = tuple(f"{sensor} {axis}" for sensor in SENSORS for axis in AXES)
 
 USUAL_GRADE = "consumer-mems"
 FITS = 2.0
@@ -92,8 +94,11 @@ def slow_is_told(noise: RateNoise) -> bool:
 
 
 def imu_noise(stream: ImuStream) -> ImuNoise:
-    """Return the noise of an IMU by its stretches at rest; raises InputError where there are none."""
+    """Return the noise of an IMU by its stretches at rest; raises InputError without one, or without any noise."""
     rest = at_rest(stream)
+    stuck = [axis for axis, share in zip(SIX, rest.repeated(), strict=True) if share == 1.0]
+    if stuck:
+        raise InputError(f"IMU {stream.name}: {', '.join(stuck)}: one value at rest throughout; expected noise")
     axes: dict[Sensor, tuple[AxisNoise, ...]] = {}
     for number, sensor in enumerate(SENSORS):
         columns = range(3 * number, 3 * number + 3)

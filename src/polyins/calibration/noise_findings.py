@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from polyins.calibration.imu_noise import AXES, FITS, SENSORS, ImuNoise, coefficients
+from polyins.calibration.imu_noise import FITS, SENSORS, SIX, ImuNoise, coefficients
 from polyins.calibration.noise_model import FLICKER, WALK, RateNoise
 from polyins.calibration.rest import Rest
 from polyins.model.findings import LEFT_OUT, Finding
@@ -25,14 +25,13 @@ Each = list[tuple[str, RateNoise]]
 
 def findings(one: ImuNoise) -> tuple[Finding, ...]:
     """Return what there is to know of the figures of an IMU."""
-    each = [
-        (f"{sensor} {axis}", of.noise) for sensor in SENSORS for axis, of in zip(AXES, one.axes[sensor], strict=True)
-    ]
+    noises = [of.noise for sensor in SENSORS for of in one.axes[sensor]]
+    each = list(zip(SIX, noises, strict=True))
     rest, nyquist = one.rest, 0.5 / one.rest.interval
     return (
         *_motion(rest),
         *_picked(rest),
-        *_repeated(rest, [axis for axis, _ in each]),
+        *_repeated(rest),
         *_filtered(rest.name, each, nyquist),
         *_lines(rest.name, each),
         *_unlike(rest.name, each),
@@ -70,8 +69,8 @@ def _picked(rest: Rest) -> Iterator[Finding]:
         )
 
 
-def _repeated(rest: Rest, axes: list[str]) -> Iterator[Finding]:
-    for axis, share in zip(axes, rest.repeated(), strict=True):
+def _repeated(rest: Rest) -> Iterator[Finding]:
+    for axis, share in zip(SIX, rest.repeated(), strict=True):
         if share > REPEATS:
             yield Finding(
                 KIND,

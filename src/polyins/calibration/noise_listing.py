@@ -18,7 +18,7 @@ ROOT_HOUR = HOUR**0.5
 
 
 @dataclass(frozen=True)
-class Figure:
+class Quantity:
     """One of the three coefficients: its name in SI and as datasheets have it."""
 
     si: str
@@ -29,18 +29,18 @@ class Figure:
     """how much of SI it is"""
 
 
-FIGURES: dict[Sensor, tuple[Figure, Figure, Figure]] = {
+QUANTITIES: dict[Sensor, tuple[Quantity, Quantity, Quantity]] = {
     "gyro": (
-        Figure("angle_random_walk_rad_sqrt_s", "angle_random_walk_deg_sqrt_h", "deg/sqrt(h)", DEG / ROOT_HOUR),
-        Figure("bias_instability_rad_s", "bias_instability_deg_h", "deg/h", DEG / HOUR),
-        Figure(
+        Quantity("angle_random_walk_rad_sqrt_s", "angle_random_walk_deg_sqrt_h", "deg/sqrt(h)", DEG / ROOT_HOUR),
+        Quantity("bias_instability_rad_s", "bias_instability_deg_h", "deg/h", DEG / HOUR),
+        Quantity(
             "rate_random_walk_rad_s_sqrt_s", "rate_random_walk_deg_h_sqrt_h", "deg/h/sqrt(h)", DEG / HOUR / ROOT_HOUR
         ),
     ),
     "accel": (
-        Figure("velocity_random_walk_m_s_sqrt_s", "velocity_random_walk_m_s_sqrt_h", "m/s/sqrt(h)", 1.0 / ROOT_HOUR),
-        Figure("bias_instability_m_s2", "bias_instability_mgal", "mGal", MGAL),
-        Figure(
+        Quantity("velocity_random_walk_m_s_sqrt_s", "velocity_random_walk_m_s_sqrt_h", "m/s/sqrt(h)", 1.0 / ROOT_HOUR),
+        Quantity("bias_instability_m_s2", "bias_instability_mgal", "mGal", MGAL),
+        Quantity(
             "acceleration_random_walk_m_s2_sqrt_s",
             "acceleration_random_walk_mgal_sqrt_h",
             "mGal/sqrt(h)",
@@ -92,7 +92,7 @@ def _imu(one: ImuNoise) -> dict[str, Any]:
 
 
 def _axis(axis: AxisNoise, sensor: Sensor) -> dict[str, Any]:
-    each = list(zip(FIGURES[sensor], coefficients(axis.noise), strict=True))
+    each = list(zip(QUANTITIES[sensor], coefficients(axis.noise), strict=True))
     curve, unit = axis.curve, RATE_UNITS[sensor]
     return {
         **{figure.si: _coefficient(one, 1.0) for figure, one in each},
@@ -154,10 +154,10 @@ def rows(figures: NoiseFigures) -> list[list[str]]:
 
 
 def _cells(sensor: Sensor, axis: AxisNoise) -> list[str]:
-    return [_cell(one, figure) for figure, one in zip(FIGURES[sensor], coefficients(axis.noise), strict=True)]
+    return [_cell(one, figure) for figure, one in zip(QUANTITIES[sensor], coefficients(axis.noise), strict=True)]
 
 
-def _cell(one: Coefficient, figure: Figure) -> str:
+def _cell(one: Coefficient, figure: Quantity) -> str:
     low, high = one.low / figure.per_unit, one.high / figure.per_unit
     if one.value is None:
         return f"at most {high:.3g} {figure.unit}"

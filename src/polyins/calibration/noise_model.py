@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,7 +180,7 @@ class Spectrum:
         squares = np.zeros(3)
         if fixed is not None:
             squares[fixed[0]] = fixed[1]
-        scale = self._scale()
+        scale = self._scale
         squares[free] = np.maximum(squares[free], 1e-3 * scale[free])
         deviance = self.deviance(squares)
         for _ in range(ROUNDS):
@@ -195,7 +196,7 @@ class Spectrum:
         return squares
 
     def _scored(self, squares: Array, free: list[int]) -> Array:
-        scale = self._scale()
+        scale = self._scale
         weight = self.count / (self.basis @ squares) ** 2
         known = squares.copy()
         known[free] = 0.0
@@ -208,6 +209,7 @@ class Spectrum:
         known[free] = solved / size * scale[free]
         return known
 
+    @cached_property
     def _scale(self) -> Array:
         """Return each of N^2, B^2, K^2 that would make all of the power by itself."""
         total = float(np.average(self.power, weights=self.count))
@@ -241,7 +243,7 @@ class Spectrum:
             return self.deviance(self.maximum((i, share * start))) - level
 
         # what is not there is looked for from a small part of all power on
-        start = max(float(best[i]), LEAST_SHARE * float(self._scale()[i]))
+        start = max(float(best[i]), LEAST_SHARE * float(self._scale[i]))
         most = 2.0
         while beyond(most) < 0.0:
             most *= 4.0
