@@ -7,6 +7,7 @@ import pytest
 from scipy.fft import dct
 
 from polyins.calibration.noise_model import Spectrum, allan_variance_of, fit
+from polyins.simulation.imu_errors import gauss_markov
 from polyins.studies.noise_cases import NoiseCase, flicker
 
 CASE = NoiseCase(random_walk=7e-5, instability=2.4e-5, rate_walk=9e-7, interval=0.1, samples=60_000)
@@ -95,6 +96,25 @@ def test_a_line_is_named_and_left_out() -> None:
     assert found.random_walk.value == pytest.approx(0.1, rel=0.01)
     assert found.excess < 1.5
     assert fit([white], 0.01).lines_hz == ()
+
+
+def test_a_bias_that_wanders_about_its_mean_is_not_described() -> None:
+    """A Gauss-Markov process of half a minute beside white noise, in which the likelihood has several maxima."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        wandering = gauss_markov(72_000, 0.1 / 30.0, rng)[:, 0]
+        found = fit([7e-5 / np.sqrt(0.1) * rng.standard_normal(72_000) + 3e-4 * wandering], 0.1)
+        assert found.off is not None
+        hz, times = found.off
+        assert 1e-3 < hz < 0.1
+        assert times < 0.5
+
+
+def test_noise_of_the_model_is_described_down_to_the_lowest_frequencies() -> None:
+    for seed in range(10):
+        case = NoiseCase(7e-5, 2.4e-5, 9e-7, interval=1.0, samples=8000)
+        found = fit([case.rates(np.random.default_rng([seed, 9]))], case.interval)
+        assert found.off is None
 
 
 def test_the_model_is_the_sum_of_its_parts() -> None:

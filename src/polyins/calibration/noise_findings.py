@@ -35,6 +35,7 @@ def findings(one: ImuNoise) -> tuple[Finding, ...]:
         *_filtered(rest.name, each, nyquist),
         *_lines(rest.name, each),
         *_unlike(rest.name, each),
+        *_off(rest.name, each),
         *_untold(rest, each),
     )
 
@@ -125,6 +126,23 @@ def _unlike(name: str, each: Each) -> Iterator[Finding]:
             expected=1.0,
             remedy="look at the plot for steps, or a ramp while it warms up",
         )
+
+
+def _off(name: str, each: Each) -> Iterator[Finding]:
+    for axis, noise in each:
+        if noise.off is not None and noise.excess <= FITS:
+            hz, times = noise.off
+            yield Finding(
+                KIND,
+                f"IMU {name}: below {hz:.2g} Hz {axis} has {times:.2g} times the variance of what was fitted: its"
+                " noise is not quite white noise, flicker and random walk",
+                "note" if 1.0 / FITS < times < FITS else "doubt",
+                stream=name,
+                axis=axis,
+                size=times,
+                expected=1.0,
+                remedy="look at the plot there",
+            )
 
 
 def _untold(rest: Rest, each: Each) -> Iterator[Finding]:

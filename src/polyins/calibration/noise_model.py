@@ -34,6 +34,8 @@ SINGLE = 32
 """coefficients of the lowest frequencies that stand for themselves; those above share bins"""
 BIN = 0.02
 """width of a bin over its frequency"""
+STARTS = np.array([[1.0, 1e-3, 1e-6], [1.0, 1e-6, 1e-2]])
+"""shares of all power that the three begin with"""
 ROUNDS = 60
 """of scoring, at most"""
 SETTLED = 1e-9
@@ -44,6 +46,8 @@ NEIGHBOURS = 10
 """bins on either side that say what is usual"""
 CHANCE = 1e-6
 """with which noise alone makes a line of a bin"""
+CHANCE_OF_LOW = 1e-5
+"""with which the low frequencies of the noise that was fitted are as far from it"""
 UNFIT = 4.0
 """standard deviations by which noise beyond a frequency may miss the model, before it is left out of the fit"""
 LOWEST_CUT = 1.0 / 64.0
@@ -84,7 +88,9 @@ class RateNoise:
     lines_hz: tuple[float, ...]
     """frequencies of lines, as of vibration, that stand out of the noise and are left out, the strongest first"""
     excess: float
-    """variance of what is left over that of the model; intervals are wider by its root where it exceeds one"""
+    """variance of what is left over, times that of the model; intervals are wider by its root where it exceeds one"""
+    off: tuple[float, float] | None
+    """below which frequency, Hz, the power is how many times that of the model; None: nowhere by more than chance"""
 
     def allan_variance(self, tau: Array) -> Array:
         """Return what the model says of averaging times, s."""
@@ -171,17 +177,24 @@ class Spectrum:
         std = np.sqrt(2.0 / weight.sum() + 2.0 / max(near, 1.0))
         return abs(mean - 1.0) / float(std)
 
-    def maximum(self, fixed: tuple[int, float] | None = None) -> Array:
+    def maximum(self, fixed: tuple[int, float] | None = None, near: Array | None = None) -> Array:
         """Return N^2, B^2, K^2 of the largest likelihood, none negative; one may be fixed at a value.
 
-        Fisher scoring: least squares with the weights of the last estimate, shortened until the deviance falls.
+        The likelihood of what is no such noise has several maxima: the largest is looked for from all sides, and from
+        `near`.
+        """
+        starts = [self._scale * shares for shares in STARTS] + ([near] if near is not None else [])
+        return min((self._ascended(start, fixed) for start in starts), key=self.deviance)
+
+    def _ascended(self, start: Array, fixed: tuple[int, float] | None) -> Array:
+        """Return the maximum that Fisher scoring finds from a start.
+
+        It is least squares with the weights of the last estimate, shortened until the deviance falls.
         """
         free = [i for i in range(3) if fixed is None or i != fixed[0]]
-        squares = np.zeros(3)
+        squares = np.array(start, dtype=float)
         if fixed is not None:
             squares[fixed[0]] = fixed[1]
-        scale = self._scale
-        squares[free] = np.maximum(squares[free], 1e-3 * scale[free])
         deviance = self.deviance(squares)
         for _ in range(ROUNDS):
             step = self._scored(squares, free) - squares
@@ -229,18 +242,32 @@ class Spectrum:
         allowed = WITHIN_95 * max(1.0, excess)
         white, flicker, walk = (self._interval(i, best, least + allowed) for i in range(3))
         up_to = float(self.angle.max()) / (2.0 * np.pi * self.interval)
-        return RateNoise(white, flicker, walk, best=best, up_to_hz=up_to, lines_hz=(), excess=excess)
+        return RateNoise(
+            white, flicker, walk, best=best, up_to_hz=up_to, lines_hz=(), excess=excess, off=self._off(best)
+        )
 
     def _excess(self, squares: Array) -> float:
         """Return Pearson's chi^2 over its expectation."""
         ratio = self.power / (self.basis @ squares)
         return float(np.sum(0.5 * self.count * (ratio - 1.0) ** 2) / max(len(ratio) - 3, 1))
 
+    def _off(self, squares: Array) -> tuple[float, float] | None:
+        """Return below which frequency, Hz, the power is how many times that of a fit, by more than chance."""
+        octave = np.floor(np.log2(self.angle / self.angle.min())).astype(int)
+        count = np.cumsum(np.bincount(octave, self.count))
+        total = np.cumsum(np.bincount(octave, self.count * self.power / (self.basis @ squares)))
+        chance = np.minimum(chi2.sf(total, count), chi2.cdf(total, count))
+        worst = int(np.argmin(chance))
+        if chance[worst] > CHANCE_OF_LOW:
+            return None
+        below = float(self.angle.min()) * 2.0 ** (worst + 1) / (2.0 * np.pi * self.interval)
+        return below, float(total[worst] / count[worst])
+
     def _interval(self, i: int, best: Array, level: float) -> Coefficient:
         """Return the root of an estimate, and where the deviance with all others free reaches a level."""
 
         def beyond(share: float) -> float:
-            return self.deviance(self.maximum((i, share * start))) - level
+            return self.deviance(self.maximum((i, share * start), best)) - level
 
         # what is not there is looked for from a small part of all power on
         start = max(float(best[i]), LEAST_SHARE * float(self._scale[i]))

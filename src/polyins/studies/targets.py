@@ -19,7 +19,7 @@ TARGETS = (
         print_tables="polyins.studies.wid:print_tables",
     ),
     Target("array", "polyins.studies.array:reproduce", seconds=(10, 240)),
-    Target("allan", "polyins.studies.allan:reproduce", datasets=("mimu4444", "logs"), seconds=(15, 70)),
+    Target("allan", "polyins.studies.allan:reproduce", datasets=("mimu4444", "logs"), seconds=(20, 90)),
     Target("consistency", "polyins.studies.consistency:reproduce"),
     Target(
         "starts",
