@@ -495,6 +495,20 @@ def test_every_key_of_the_summaries_is_listed(written: Path) -> None:
         assert f"`{path}`" in listed["run"], path
 
 
+def test_every_key_of_allan_is_listed() -> None:
+    from polyins.calibration.noise_listing import document
+    from polyins.tools.noise import noise_figures
+
+    time, rng = np.arange(1, 1501) * 0.02, np.random.default_rng(0)
+    still = [
+        ImuStream(name, time, 1e-5 * rng.standard_normal((1500, 3)), 1e-4 * rng.standard_normal((1500, 3)))
+        for name in ("left", "right")
+    ]
+    named = {"polyins", "left", "right", *config.Noise.model_fields}
+    for key in keys(document(noise_figures(tuple(still)))):
+        assert key in named or f"`{key}`" in section("### allan"), key
+
+
 def keys(document: dict[str, Any]) -> Iterator[str]:
     for key, value in document.items():
         yield key

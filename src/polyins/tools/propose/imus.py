@@ -70,7 +70,7 @@ def _noise_line(rows: ImuRows, stated: tuple[float, float] | None = None) -> Lin
         angle, velocity = max(angle, stated[0]) / DEG * np.sqrt(HOUR), max(velocity, stated[1]) * np.sqrt(HOUR)
         given = f"angle_random_walk_deg_sqrt_h: {angle:.3g}, velocity_random_walk_m_s_sqrt_h: {velocity:.3g}"
         return Line(f"    noise: {{grade: {GRADE}, {given}}}", "what the log states, or shakes from row to row if more")
-    grades = f"a grade ({', '.join(NOISE_GRADES)}) or figures"
+    grades = f"a grade ({', '.join(NOISE_GRADES)}), a common IMU by name, or figures"
     walks = {
         "angle_random_walk_deg_sqrt_h": angle / DEG * np.sqrt(HOUR),
         "velocity_random_walk_m_s_sqrt_h": velocity * np.sqrt(HOUR),
