@@ -75,3 +75,10 @@ def test_repeated_samples_are_counted() -> None:
     repeated = at_rest(of_rates("a", rates)).repeated()
     assert repeated[1] == pytest.approx(0.75, abs=0.01)
     assert repeated[0] == 0.0
+
+
+def test_a_few_rows_are_no_rest() -> None:
+    with pytest.raises(InputError, match=r"IMU a: has 2 row\(s\); expected 10 s at rest"):
+        at_rest(stream("a", 0.04, 9))
+    with pytest.raises(InputError, match="measures for less than a second"):
+        at_rest(stream("a", 0.5, 9))

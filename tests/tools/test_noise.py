@@ -118,3 +118,35 @@ def test_ones_that_rest_at_different_times_are_no_array(files: list[Path], tmp_p
     assert found["array"] is None
     assert len(found["imus"]) == 2
     assert any("what the array gains is not told" in one["text"] for one in found["findings"])
+
+
+def test_clocks_that_rest_does_not_tell_are_taken_as_they_are(files: list[Path], tmp_path: Path) -> None:
+    config = tmp_path / "drive.yaml"
+    columns = "{time: {name: time}, gyro: {names: [gyro_x, gyro_y, gyro_z], unit: rad/s}, "
+    columns += "accel: {names: [acc_x, acc_y, acc_z], unit: m/s^2}}"
+    entries = [f"  - {{file: {file}, columns: {columns}, axes: [x, -y, -z]{more}}}" for file, more in
+               ((files[0], ""), (files[1], ", time_offset: estimate"))]  # fmt: skip
+    config.write_text("\n".join(["imus:", *entries]) + "\n")
+    done = run(config, "--json")
+    assert done.exit_code == 0
+    found = json.loads(done.stdout)
+    assert len(found["imus"]) == 2
+    assert any(one["kind"] == "clock" and "taken as they are" in one["text"] for one in found["findings"])
+
+
+def test_nothing_is_said_twice(files: list[Path]) -> None:
+    said = [line for line in run(files[0]).stderr.splitlines() if line]
+    assert any(line.startswith("assumed axes") for line in said)
+    assert len(said) == len(set(said))
+
+
+def test_a_refusal_says_that_the_unit_is_a_guess(files: list[Path], tmp_path: Path) -> None:
+    """Of a table in deg/s that may be rad/s as well."""
+    rows = np.loadtxt(files[0], delimiter=",", skiprows=1)
+    rows[:, 1:4] = np.degrees(rows[:, 1:4]) + np.array([0.5, -0.3, 0.2])
+    path = tmp_path / "degrees.csv"
+    np.savetxt(path, rows, "%.9g", ",", header="time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z", comments="")
+    done = run(path)
+    assert isinstance(done.exception, InputError)
+    assert "never rests" in str(done.exception)
+    assert "rad or deg is a guess" in str(done.exception)

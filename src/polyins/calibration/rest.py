@@ -21,6 +21,8 @@ from polyins.prepare.timesync import GAP, Aligned
 
 Array = NDArray[np.float64]
 
+FEWEST = 3
+"""rows"""
 SHORTEST_S = 10.0
 """s at rest of a stretch that is used"""
 LONGEST_PAUSE_S = 1.0
@@ -77,6 +79,8 @@ def at_rest(stream: ImuStream) -> Rest:
 
     Raises InputError, saying what is missing, if no stretch is long enough.
     """
+    if len(stream.time) < FEWEST:
+        raise InputError(f"IMU {stream.name}: has {len(stream.time)} row(s); expected {SHORTEST_S:.0f} s at rest")
     increments = np.concatenate([stream.dtheta, stream.dvel], axis=1)
     aligned = Aligned(stream.time, increments[:, :, None], (), np.zeros((len(stream.time), 1), bool))
     intervals = resting_intervals(aligned)

@@ -25,17 +25,24 @@ def read_streams(settings: Settings) -> tuple[tuple[ImuStream, ...], tuple[Findi
     """
     config, alone = settings.config, len(settings.config.imus) == 1
     read = [read_imu(entry, index, settings.document, alone=alone) for index, entry in enumerate(config.imus)]
-    warnings = [text for one in read for text in one.check()]
-    found = tuple(finding for one in read for finding in one.findings)
-    notes = tuple(Finding("data", text) for text in dict.fromkeys(warnings))
-    return _on_one_clock(settings, read), (*notes, *found, *settings.findings)
+    streams, unclocked = _on_one_clock(settings, read)
+    found = (*settings.findings, *(finding for one in read for finding in one.findings))
+    said = {finding.sentence for finding in found}
+    warnings = [*settings.warnings, *(text for one in read for text in one.check())]
+    notes = (Finding("data", text) for text in dict.fromkeys(warnings) if text not in said)
+    return streams, (*notes, *found, *unclocked)
 
 
-def _on_one_clock(settings: Settings, read: list[ReadImu]) -> tuple[ImuStream, ...]:
+def _on_one_clock(settings: Settings, read: list[ReadImu]) -> tuple[tuple[ImuStream, ...], tuple[Finding, ...]]:
+    """Estimate offsets of clocks where they are asked for; what rests throughout does not tell them."""
     streams = tuple(one.stream for one in read)
     if not any(entry.time_offset for entry in settings.config.imus):
-        return streams
-    return on_one_clock(settings.config, settings.document, tuple(one.imu for one in read), streams)[1]
+        return streams, ()
+    try:
+        return on_one_clock(settings.config, settings.document, tuple(one.imu for one in read), streams)[1], ()
+    except InputError as error:
+        text = f"clocks are taken as they are, so that what IMUs have in common is not seen: {error}"
+        return streams, (Finding("clock", text),)
 
 
 def noise_figures(streams: tuple[ImuStream, ...], known: tuple[Finding, ...] = ()) -> NoiseFigures:
@@ -52,7 +59,9 @@ def noise_figures(streams: tuple[ImuStream, ...], known: tuple[Finding, ...] = (
         except InputError as error:
             refused.append(error)
     if not told:
-        raise refused[0]
+        # rates in a wrong unit shake too much, or hardly
+        guessed = [finding.sentence for finding in known if finding.kind == "units"]
+        raise InputError("; ".join([str(refused[0]), *guessed]))
     findings = [Finding(LEFT_OUT, str(error), "serious") for error in refused]
     names = {one.rest.name for one in told}
     array, lacking = _of_array(tuple(one for one in streams if one.name in names))
