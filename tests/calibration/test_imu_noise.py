@@ -14,7 +14,9 @@ from polyins.calibration.noise_listing import QUANTITIES, NoiseFigures, configur
 from polyins.config import NOISE_GRADES, Noise
 from polyins.config.units import read
 from polyins.errors import InputError
+from polyins.model.recording import ImuStream
 from polyins.model.rig import NoiseGrade
+from polyins.simulation.imu_errors import gauss_markov
 from polyins.studies.noise_cases import NoiseCase
 
 
@@ -55,6 +57,21 @@ def test_a_drift_that_is_seen_is_told(drifting: ImuNoise) -> None:
     # as large as the flicker at least, at a hundred seconds
     ten_minutes = grade.gyro_bias_std[0] * np.sqrt(2.0 * 100.0 / (3.0 * grade.correlation_time))
     assert ten_minutes > 0.9 * 0.664 * 5e-5
+
+
+def test_the_figures_of_a_simulated_imu_come_back() -> None:
+    """Of two hours at rest with the biases that the filter's model has; those of the worst of three axes."""
+    rng, interval, count = np.random.default_rng(1), 0.1, 72_000
+    grade = read(Noise.model_validate("consumer-mems"), NoiseGrade)
+    white = rng.standard_normal((count, 6)) / np.sqrt(interval)
+    walks = np.concatenate([grade.angle_random_walk, grade.velocity_random_walk])
+    biases = gauss_markov(count, interval / grade.correlation_time, rng)[:, :6] * grade.steady_std()[:6]
+    rates = white * walks + biases + [0.0, 0.0, 0.0, 0.0, 0.0, -9.81]
+    time = np.arange(1, count + 1) * interval
+    said = imu_noise(ImuStream("a", time, rates[:, :3] * interval, rates[:, 3:] * interval)).configuration()
+    for key, stated in NOISE_GRADES["consumer-mems"].items():
+        if "scale" not in key:
+            assert said[key] == pytest.approx(stated, rel=0.02 if "walk" in key else 0.4), key
 
 
 def test_short_rests_tell_no_drift() -> None:
