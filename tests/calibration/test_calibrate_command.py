@@ -11,7 +11,7 @@ from pymap3d import ned2geodetic
 from simulated_drive import body_stream, drive, fixes, wheel_stream
 
 from polyins.calibration.configuration import calibrated
-from polyins.calibration.drive import Calibration, Estimate
+from polyins.calibration.estimates import Calibration, Estimate
 from polyins.cli import cli
 from polyins.config import parse
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
@@ -162,7 +162,7 @@ def test_a_recording_without_wheels_is_refused(files: Path) -> None:
 def test_what_the_drive_hardly_tells_stays_as_configured() -> None:
     """The body's yaw on a robot that hardly accelerates, say."""
     estimate = Estimate("mount_deg", (1.0, 2.0, 7.0), (0.5, 0.2, 17.0), (0.0, 0.1, 0.2))
-    calibration = Calibration({"body": (estimate,)}, "", (), ())
+    calibration = Calibration({"body": (estimate,)}, (), ())
     values = {"imus": [{"name": "body", "file": "body.csv", "mount_deg": [0.0, 0.1, 0.2]}]}
     text = calibrated(values, parse(Document(Path("drive.yaml"), values)), calibration)
     assert "mount_deg: [1.0, 2.0, 0.2]" in text

@@ -13,7 +13,7 @@ from simulated_drive import (
     wheel_stream,
 )
 
-from polyins.calibration.drive import Calibration, Estimate, calibrate
+from polyins.calibration.estimates import Calibration, Estimate, calibrate
 from polyins.errors import InputError
 from polyins.model.rig import Imu
 
