@@ -48,7 +48,7 @@ def calibrate(recording: Recording, entries: Sequence[ImuEntry]) -> Calibration:
     if common.gyro is not None and common.accel is not None and len(imus) > 1:
         found = found.with_places(common.gyro.matrix, common.accel.matrix)
     warnings += [*_untold(found), *_without(common)]
-    whole = _Whole(found, common, np.cov(found.motion.smoothed(found.rate(), found.motion.instants).T))
+    whole = _Whole(found, common, _turning(found, common))
     return Calibration(
         {imu.name: whole.estimates(i, imu, by_name[imu.name], imus) for i, imu in enumerate(imus)},
         recording.clock_offsets,
@@ -59,6 +59,12 @@ def calibrate(recording: Recording, entries: Sequence[ImuEntry]) -> Calibration:
             "calibrated": Agreement(found.gyros.after, found.accels.after),
         },
     )
+
+
+def _turning(found: Differences, common: Common) -> Array:
+    """Return the covariance of the array's rates, (rad/s)^2, shape (3, 3)."""
+    rates = found.motion.smoothed(found.rate(), found.motion.instants) @ _times(common.gyro, np.eye(3)).T
+    return np.cov(rates.T)
 
 
 def _gravity(recording: Recording) -> tuple[float, list[str]]:
@@ -150,7 +156,7 @@ class _Whole:
         known = {key: np.array(getattr(entry, key)) for key in PLAIN}
         gyro = _times(self.common.gyro, gyros.matrix[i]) @ imu.rotation @ known["gyro_matrix"]
         accel = _times(self.common.accel, accels.matrix[i]) @ imu.rotation @ known["accel_matrix"]
-        rotation = _fitting_rotation(gyro, self.turning)
+        rotation = fitting_rotation(gyro, self.turning)
         before, after = nearest_axes(imu.rotation), nearest_axes(rotation)
         if np.trace(rotation @ imu.rotation.T) > 3.0 * SAME_AXES:
             after = before
@@ -158,9 +164,9 @@ class _Whole:
         turned = _cross(turns).reshape(-1, 9)
         std = [jackknife_std(one.errors[:, i, :9] - turned).reshape(3, 3) for one in (gyros, accels)]
         gyro_std, accel_std = np.hypot(std[0], _std_of(self.common.gyro)), np.hypot(std[1], _std_of(self.common.accel))
-        angles = jackknife_std(turns) / DEG
+        angles = np.hypot(jackknife_std(turns), _turned_by(_std_of(self.common.gyro), self.turning)) / DEG
         names = [", ".join(_axis(row) for row in axes) for axes in (after, before)]
-        mounts = [_euler(one @ axes.T) for one, axes in ((rotation, after), (imu.rotation, after))]
+        mounts = [euler_deg(one @ axes.T) for one, axes in ((rotation, after), (imu.rotation, after))]
         axes = () if names[0] == names[1] else (Estimate("axes", names[0], None, names[1]),)
         return (
             *axes,
@@ -185,10 +191,11 @@ class _Whole:
 
     def _biases(self, i: int, imu: Imu, imus: Sequence[Imu]) -> tuple[Estimate, ...]:
         """Return biases and how sure they are when the IMUs are switched on another time and have drifted."""
-        gyro, accel = self.common.gyro_bias, self.common.accel
+        accel = self.common.accel
+        accel_bias = None if accel is None else (accel.bias, accel.bias_std)
         kinds = (
-            ("gyro_bias_deg_s", self.found.gyros, self.common.gyro, gyro, DEG),
-            ("accel_bias_m_s2", self.found.accels, accel, accel and (accel.bias, accel.bias_std), 1.0),
+            ("gyro_bias_deg_s", self.found.gyros, self.common.gyro, self.common.gyro_bias, DEG),
+            ("accel_bias_m_s2", self.found.accels, accel, accel_bias, 1.0),
         )
         estimates = []
         for key, fitted, triad, shared, unit in kinds:
@@ -239,7 +246,7 @@ def _std_of(triad: Triad | None) -> Array:
     return np.zeros((3, 3)) if triad is None else triad.matrix_std
 
 
-def _fitting_rotation(matrix: Array, turning: Array) -> Array:
+def fitting_rotation(matrix: Array, turning: Array) -> Array:
     """Return the rotation that makes of what a sensor shows the array's rates best, as it was turned.
 
     `matrix`: makes them of it wholly; `turning`: covariance of the rates, (rad/s)^2.
@@ -249,10 +256,18 @@ def _fitting_rotation(matrix: Array, turning: Array) -> Array:
 
 
 def _rotations(errors: Array, turning: Array) -> Array:
-    """Return the rotations that fit error matrices best, as in `_fitting_rotation`, rad, shapes (B, 9) to (B, 3)."""
+    """Return the rotations that fit error matrices best, as in `fitting_rotation`, rad, shapes (B, 9) to (B, 3)."""
     product = errors.reshape(-1, 3, 3) @ turning
     around = np.array([product[:, k, j] - product[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))])
     return np.asarray(np.linalg.solve(np.trace(turning) * np.eye(3) - turning, around).T)
+
+
+def _turned_by(std: Array, turning: Array) -> Array:
+    """Return by what the fitting rotation errs for a symmetric matrix that errs by `std`, shape (3, 3), rad."""
+    elements = [np.zeros((3, 3)) for _ in poses.UPPER]
+    for element, (i, j) in zip(elements, poses.UPPER, strict=True):
+        element[i, j] = element[j, i] = std[i, j]
+    return np.asarray(np.linalg.norm(_rotations(np.array(elements).reshape(-1, 9), turning), axis=0))
 
 
 def _cross(vectors: Array) -> Array:
@@ -275,7 +290,8 @@ def _axis(row: Array) -> str:
     return ("-" if row[k] < 0.0 else "") + "xyz"[k]
 
 
-def _euler(rotation: Array) -> tuple[float, ...]:
+def euler_deg(rotation: Array) -> tuple[float, ...]:
+    """Return roll, pitch, yaw of a rotation, deg."""
     from scipy.spatial.transform import Rotation
 
     return _plain(Rotation.from_matrix(rotation).as_euler("ZYX", degrees=True)[::-1])

@@ -52,7 +52,7 @@ class CommonMotion:
         reach = int(np.ceil(REACH * SIGMA / self.step))
         near = maximum_filter1d(self.lost.astype(np.int8), 2 * reach + 1, mode="constant", cval=1)
         rows = np.arange(reach, len(self.time) - reach, max(1, round(SPACING / self.step)))
-        return rows[near[rows] == 0]
+        return np.asarray(rows[near[rows] == 0], dtype=np.intp)
 
     def smoothed(self, values: Array, rows: NDArray[np.intp], derivative: int = 0) -> Array:
         """Return values on the grid, shape (T, ...), or their derivative per s, smoothed, at some rows."""

@@ -31,7 +31,7 @@ SPARE = 3
 """equations beyond the unknowns: with fewer nothing shows how good a fit is"""
 EARTH_RATE = 7.292115e-5
 """rad/s: what gyros show at rest besides their bias, in a direction that is not known here"""
-ROUNDS = 10
+ROUNDS = 5
 
 UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """elements of a symmetric matrix"""
@@ -120,7 +120,8 @@ def common(moved: CommonMotion, rate: Array, force: Array, gravity: float) -> Co
     swap = np.arange(9).reshape(3, 3).T.ravel()
     even, odd = (0.5 * (np.eye(9) + sign * np.eye(9)[swap]) for sign in (1.0, -1.0))
     even_std, odd_std = (np.sqrt(np.diag(part @ covariance @ part.T)).reshape(3, 3) for part in (even, odd))
-    gyro = Triad(symmetric, rates.mean(axis=0), even_std, bias_std)
+    # what the frame of the accelerometers errs by is in the gyros too
+    gyro = Triad(symmetric, rates.mean(axis=0), np.hypot(even_std, accel.matrix_std), bias_std)
     turned = Triad(to_gyros @ accel.matrix, accel.bias, np.hypot(accel.matrix_std, odd_std), accel.bias_std)
     return Common(poses, known.gyro_bias, gyro, turned)
 

@@ -13,9 +13,9 @@ the mean of the matrices, biases and places of the IMUs stays as configured.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,8 @@ ALIKE = 20.0 * DEG
 """IMUs whose axes, as configured, are nearer than this to each other make the frame"""
 BLOCKS = 50
 """left out in turn for the uncertainty; each has as much time and motion as any"""
-ROUNDS = 20
-SETTLED = 1e-9
+FIRST_ROUNDS, ROUNDS = 3, 20
+SETTLED = 1e-8
 """relative, rad or m: smaller corrections end the rounds"""
 SHIFTS, CLOSE = 4, 1e-5
 """s: streams are shifted by their delays until less is left"""
@@ -230,6 +230,11 @@ class _State:
         turned = np.einsum("nij,tnj->tni", self.matrix, values)
         return np.asarray(turned - self.bias - np.einsum("tae,ne->tna", added, self.extra))
 
+    def off(self, other: _State) -> float:
+        """Return the largest difference from another one."""
+        parts = ((self.matrix, other.matrix), (self.bias, other.bias), (self.extra, other.extra))
+        return max(float(np.abs(one - two).max()) for one, two in parts)
+
     def stepped(self, step: Array) -> _State:
         """Take off what the corrected values still err by, shape (N, 12 + E), keeping the means of those alike."""
         count = len(step)
@@ -250,27 +255,27 @@ def _settled(values: Array, begun: _State, regressors: Regressors, clear_extra: 
     """Fit what differs between values, shape (M, N, 3), twice: the first time shows what is told at all."""
     extras = begun.extra.shape[1]
     told, extra_told = np.eye(3), np.eye(extras)
-    as_configured = begun.corrected(values, regressors(begun.matrix))
-    for last in (False, True):
+    before = _mean_and_rest(begun.corrected(values, regressors(begun.matrix)))[1]
+    for rounds in (FIRST_ROUNDS, ROUNDS):
         state = begun
         basis = _basis(told, extra_told)
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             added = regressors(state.matrix)
             mean, left = _mean_and_rest(state.corrected(values, added))
             design = _design(mean, added) @ basis
-            steps = np.array([_solved(*_normal(design, left[:, i], mean)) for i in range(left.shape[1])])
-            step = steps[:, 0] @ basis.T
-            state = state.stepped(step)
-            if np.abs(step).max() < SETTLED:
+            whole = np.array([0, len(mean)])
+            step = np.array([_solved(*_normal(design, one, whole))[0] for one in left.transpose(1, 0, 2)])
+            last, state = state, state.stepped(step @ basis.T)
+            if state.off(last) < SETTLED:
                 break
-        if not last:
+        if rounds == FIRST_ROUNDS:
             noise = float(np.sqrt(np.mean(left**2)))
             told = _told_inputs(mean, noise)
             extra_told = _told_extras(_design(mean, added), told, noise, clear_extra)
-    errors = (steps[:, 1:] @ basis.T).transpose(1, 0, 2)
+    edges = _block_edges(mean)
+    left_out = np.array([_solved(*_normal(design, one, edges))[1:] for one in left.transpose(1, 0, 2)])
+    errors = (left_out @ basis.T).transpose(1, 0, 2)
     errors = errors - errors[:, begun.alike].mean(axis=1, keepdims=True)
-    _, left = _mean_and_rest(state.corrected(values, regressors(state.matrix)))
-    before = _mean_and_rest(as_configured)[1]
     rms = [float(np.sqrt(np.mean((one - one.mean(axis=0)) ** 2))) for one in (before, left)]
     return Fitted(state.matrix, state.bias, state.extra, errors, told, extra_told, rms[0], rms[1])
 
@@ -318,18 +323,16 @@ def _told_extras(design: Array, told: Array, noise: float, clear: float) -> Arra
     return np.asarray(directions[:, std < clear])
 
 
-def _normal(design: Array, left: Array, mean: Array) -> tuple[Array, Array]:
-    """Return normal matrices and right sides of each block, shapes (B, P, P) and (B, P).
+def _normal(design: Array, left: Array, edges: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return normal matrices and right sides of the blocks between edges, shapes (B, P, P) and (B, P).
 
     Axes count by what is left on them, instants that do not fit less (Huber).
     """
     spread = np.sqrt(np.mean(left**2, axis=0)) + np.finfo(float).tiny
-    trust = huber(np.linalg.norm(left / spread, axis=1))
-    weights = np.sqrt(trust)[:, None] / spread
+    weights = np.sqrt(huber(np.linalg.norm(left / spread, axis=1)))[:, None] / spread
     rows, observed = design * weights[:, :, None], left * weights
-    edges = _block_edges(mean)
     normal, right = [], []
-    for first, last in itertools.pairwise(edges):
+    for first, last in pairwise(edges.tolist()):
         part = rows[first:last].reshape(-1, rows.shape[2])
         normal.append(part.T @ part)
         right.append(part.T @ observed[first:last].reshape(-1))
