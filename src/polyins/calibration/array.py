@@ -109,7 +109,7 @@ def _missing(told: Array) -> Array:
 
 def _direction(vector: Array) -> str:
     sign = np.sign(vector[np.argmax(np.abs(vector))])
-    return "(" + ", ".join(f"{value + 0.0:.2f}" for value in sign * vector) + ")"
+    return "(" + ", ".join(f"{value:.2f}" for value in np.round(sign * vector, 2) + 0.0) + ")"
 
 
 def _without(common: Common) -> list[str]:

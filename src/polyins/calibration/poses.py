@@ -76,7 +76,7 @@ class Common:
 
 def held(moved: CommonMotion, rate: Array, force: Array) -> tuple[Pose, ...]:
     """Return the attitudes that were held, from the mean rate and force on the grid, shape (T, 3) each."""
-    from scipy.ndimage import uniform_filter1d
+    from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
     length = max(2, round(WINDOW / moved.step))
     every = np.arange(len(rate))
@@ -84,7 +84,8 @@ def held(moved: CommonMotion, rate: Array, force: Array) -> tuple[Pose, ...]:
     mean = uniform_filter1d(smooth, length, axis=0)
     spread = np.sqrt(np.maximum(uniform_filter1d(smooth**2, length, axis=0) - mean**2, 0.0))
     quiet = (spread[:, :3].max(axis=1) < STILL_RATE) & (spread[:, 3:].max(axis=1) < STILL_FORCE)
-    quiet &= (np.linalg.norm(mean[:, :3], axis=1) < LARGEST_BIAS) & ~moved.lost
+    quiet &= np.linalg.norm(mean[:, :3], axis=1) < LARGEST_BIAS
+    quiet &= maximum_filter1d(moved.lost.astype(np.int8), length) == 0
     quiet[: length // 2] = quiet[-(length // 2) :] = False
     # the middles of still windows, one after the other
     edges = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8)))
@@ -92,8 +93,7 @@ def held(moved: CommonMotion, rate: Array, force: Array) -> tuple[Pose, ...]:
     for first, last in edges.reshape(-1, 2):
         # a still window may hold the very first of a turn at its end
         rows = slice(int(first) - length // 4, int(last) + length // 4)
-        if not moved.lost[rows].any():
-            poses.append(Pose(rows, rate[rows].mean(axis=0), force[rows].mean(axis=0)))
+        poses.append(Pose(rows, rate[rows].mean(axis=0), force[rows].mean(axis=0)))
     return tuple(poses)
 
 

@@ -35,10 +35,14 @@ SETTLED = 1e-8
 """relative, rad or m: smaller corrections end the rounds"""
 SHIFTS, CLOSE = 4, 1e-5
 """s: streams are shifted by their delays until less is left"""
+_HELD = np.concatenate([np.full(9, 0.1**-2), np.zeros(3), np.full(3, 1.0)])
+"""of error matrix, bias and places, m, or delay, s: chips and hands do not err by more than 0.1 and 1"""
 CORRELATED = 2.0
 """neighbouring instants count for so many fewer, roughly, where it is judged what can be told at all"""
 CLEAR_MATRIX, CLEAR_PLACE, CLEAR_DELAY = 5e-3, 0.01, 2e-3
 """std, relative, m and s, above which the motion does not tell: real chips differ by less"""
+CONFIGURED = 0.05
+"""share of the mean square of all rates, or of gravity's, that about an axis shows more than lever arms do"""
 NEAR_GRAVITY = 3.0
 """m/s^2: a force of another size has more than gravity in it"""
 LEAST_TURN = 0.5 * DEG
@@ -105,7 +109,8 @@ class Differences:
         lever = lever_matrices(self.rate() @ gyro.T, self.motion, rows)
         begun = _State(self.accels.matrix, self.accels.bias, self.accels.extra, self.alike)
         added = np.linalg.inv(accel) @ lever
-        fitted = _settled(self.motion.smoothed(self.motion.force, rows), begun, lambda _: added, CLEAR_PLACE)
+        extra = _by_place(added, self.motion, self.gyros)
+        fitted = _settled(self.motion.smoothed(self.motion.force, rows), begun, extra)
         return replace(self, accels=replace(fitted, before=self.accels.before))
 
 
@@ -156,6 +161,9 @@ def _start(rate: Array, force: Array) -> tuple[Array, NDArray[np.bool_]]:
     turning, pull = rate - rate.mean(axis=0), force[upright] / STANDARD_GRAVITY
     size = np.sqrt(np.mean(turning**2)) * np.sqrt(3.0 * len(turning))
     vectors = np.concatenate([turning / size, pull / np.sqrt(max(len(pull), 1))])
+    # where motion hardly tells, axes are as configured
+    as_configured = np.broadcast_to(np.sqrt(CONFIGURED) * np.eye(3)[:, None], (3, count, 3))
+    vectors = np.concatenate([vectors, as_configured])
     between = np.array([[_rotation(vectors[:, i], vectors[:, j]) for j in range(count)] for i in range(count)])
     agrees = np.trace(between, axis1=2, axis2=3) > 1.0 + 2.0 * np.cos(ALIKE)
     first = int(np.argmax(agrees.sum(axis=1)))
@@ -175,8 +183,16 @@ def _nearest_rotation(matrix: Array) -> Array:
     return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
 
 
-Regressors = Callable[[Array], Array]
-"""gives what the extra parameters add at each instant, shape (M, 3, E), for matrices, shape (N, 3, 3)"""
+@dataclass(frozen=True)
+class _Extra:
+    """What is fitted beside matrices and biases: delays or places."""
+
+    added: Callable[[Array], Array]
+    """gives what each adds at the instants, shape (M, 3, E), from the matrices, shape (N, 3, 3)"""
+    noise: float
+    """of that, squared, along all axes: it looks like motion and tells nothing"""
+    clear: float
+    """std above which the motion does not tell"""
 
 
 def _gyros(moved: CommonMotion, rows: NDArray[np.intp], start: Array, alike: NDArray[np.bool_]) -> Fitted:
@@ -187,14 +203,25 @@ def _gyros(moved: CommonMotion, rows: NDArray[np.intp], start: Array, alike: NDA
         return np.asarray(np.einsum("nij,tnj->ti", matrix, change) / len(matrix))[:, :, None]
 
     begun = _State(start, np.zeros((len(start), 3)), np.zeros((len(start), 1)), alike)
-    return _settled(moved.smoothed(moved.rate, rows), begun, by_delay, CLEAR_DELAY)
+    extra = _Extra(by_delay, 3.0 * _noise(_mean_and_rest(change)[1]), CLEAR_DELAY)
+    return _settled(moved.smoothed(moved.rate, rows), begun, extra)
 
 
 def _accels(moved: CommonMotion, rows: NDArray[np.intp], gyros: Fitted, begun: _State) -> Fitted:
     """Fit matrices, biases and places of the accelerometers."""
-    rate = gyros.mean(moved.rate)
-    lever = lever_matrices(rate, moved, rows)
-    return _settled(moved.smoothed(moved.force, rows), begun, lambda _: lever, CLEAR_PLACE)
+    lever = lever_matrices(gyros.mean(moved.rate), moved, rows)
+    return _settled(moved.smoothed(moved.force, rows), begun, _by_place(lever, moved, gyros))
+
+
+def _by_place(lever: Array, moved: CommonMotion, gyros: Fitted) -> _Extra:
+    rows = moved.instants
+    change = np.einsum("nij,tnj->tni", gyros.matrix, moved.smoothed(moved.rate, rows, 1))
+    return _Extra(lambda _: lever, 2.0 * _noise(_mean_and_rest(change)[1]), CLEAR_PLACE)
+
+
+def _noise(left: Array) -> float:
+    """Return the variance of the mean's noise along an axis from what IMUs differ by, shape (M, N, 3)."""
+    return float(np.mean(left**2) / (left.shape[1] - 1))
 
 
 def lever_matrices(rate: Array, moved: CommonMotion, rows: NDArray[np.intp]) -> Array:
@@ -251,29 +278,30 @@ class _State:
         )
 
 
-def _settled(values: Array, begun: _State, regressors: Regressors, clear_extra: float) -> Fitted:
+def _settled(values: Array, begun: _State, extra: _Extra) -> Fitted:
     """Fit what differs between values, shape (M, N, 3), twice: the first time shows what is told at all."""
     extras = begun.extra.shape[1]
     told, extra_told = np.eye(3), np.eye(extras)
-    before = _mean_and_rest(begun.corrected(values, regressors(begun.matrix)))[1]
+    before = _mean_and_rest(begun.corrected(values, extra.added(begun.matrix)))[1]
     for rounds in (FIRST_ROUNDS, ROUNDS):
         state = begun
         basis = _basis(told, extra_told)
+        # the first time nothing that is not told may grow
+        held = _HELD[: 12 + extras] if rounds == FIRST_ROUNDS else np.zeros(basis.shape[1])
         for _ in range(rounds):
-            added = regressors(state.matrix)
+            added = extra.added(state.matrix)
             mean, left = _mean_and_rest(state.corrected(values, added))
             design = _design(mean, added) @ basis
             whole = np.array([0, len(mean)])
-            step = np.array([_solved(*_normal(design, one, whole))[0] for one in left.transpose(1, 0, 2)])
+            step = np.array([_solved(*_normal(design, one, whole), held)[0] for one in left.transpose(1, 0, 2)])
             last, state = state, state.stepped(step @ basis.T)
             if state.off(last) < SETTLED:
                 break
         if rounds == FIRST_ROUNDS:
-            noise = float(np.sqrt(np.mean(left**2)))
-            told = _told_inputs(mean, noise)
-            extra_told = _told_extras(_design(mean, added), told, noise, clear_extra)
+            told = _told_inputs(mean, left)
+            extra_told = _told_extras(_design(mean, added), told, left, extra)
     edges = _block_edges(mean)
-    left_out = np.array([_solved(*_normal(design, one, edges))[1:] for one in left.transpose(1, 0, 2)])
+    left_out = np.array([_solved(*_normal(design, one, edges), held)[1:] for one in left.transpose(1, 0, 2)])
     errors = (left_out @ basis.T).transpose(1, 0, 2)
     errors = errors - errors[:, begun.alike].mean(axis=1, keepdims=True)
     rms = [float(np.sqrt(np.mean((one - one.mean(axis=0)) ** 2))) for one in (before, left)]
@@ -303,14 +331,13 @@ def _basis(told: Array, extra_told: Array) -> Array:
     return basis
 
 
-def _told_inputs(mean: Array, noise: float) -> Array:
-    """Return the directions in which the mean varies enough, columns."""
+def _told_inputs(mean: Array, left: Array) -> Array:
+    """Return the directions in which the mean varies enough, by more than noise, columns."""
     varies, directions = np.linalg.eigh(np.cov(mean.T))
-    std = noise * np.sqrt(CORRELATED / (len(mean) * np.maximum(varies, np.finfo(float).tiny)))
-    return np.asarray(directions[:, std < CLEAR_MATRIX])
+    return np.asarray(directions[:, _std(left, len(mean) * (varies - _noise(left))) < CLEAR_MATRIX])
 
 
-def _told_extras(design: Array, told: Array, noise: float, clear: float) -> Array:
+def _told_extras(design: Array, told: Array, left: Array, extra: _Extra) -> Array:
     """Return the directions of the extra parameters that can be told beside all others, columns."""
     extras = design.shape[2] - 12
     basis = _basis(told, np.eye(extras))
@@ -319,8 +346,13 @@ def _told_extras(design: Array, told: Array, noise: float, clear: float) -> Arra
     cross = normal[:split, split:]
     alone = normal[split:, split:] - cross.T @ np.linalg.pinv(normal[:split, :split], hermitian=True) @ cross
     known, directions = np.linalg.eigh(alone)
-    std = noise * np.sqrt(CORRELATED / np.maximum(known, np.finfo(float).tiny))
-    return np.asarray(directions[:, std < clear])
+    return np.asarray(directions[:, _std(left, known - len(design) * extra.noise) < extra.clear])
+
+
+def _std(left: Array, information: Array) -> Array:
+    """Return the std of what rests on sums of squares, from what is left; infinite where there are none."""
+    variance = CORRELATED * np.mean(left**2) / np.maximum(information, np.finfo(float).tiny)
+    return np.asarray(np.sqrt(variance))
 
 
 def _normal(design: Array, left: Array, edges: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -346,9 +378,12 @@ def _block_edges(mean: Array) -> NDArray[np.intp]:
     return np.concatenate([[0], np.searchsorted(share, np.arange(1, BLOCKS) / BLOCKS), [len(mean)]])
 
 
-def _solved(normal: Array, right: Array) -> Array:
-    """Return the solution of all blocks, and what leaving out each one changes, shape (1 + B, P)."""
-    whole, aim = normal.sum(axis=0), right.sum(axis=0)
+def _solved(normal: Array, right: Array, held: Array) -> Array:
+    """Return the solution of all blocks, and what leaving out each one changes, shape (1 + B, P).
+
+    `held`: what is known beforehand of each parameter, that it is nought, as information, shape (P,).
+    """
+    whole, aim = normal.sum(axis=0) + np.diag(held), right.sum(axis=0)
     scale = 1.0 / np.sqrt(np.diag(whole) + np.finfo(float).tiny)
     both = np.concatenate([whole[None], whole - normal]) * scale[:, None] * scale
     sides = np.concatenate([aim[None], aim - right]) * scale

@@ -143,8 +143,8 @@ def deviations(simulation: Simulation) -> dict[str, Array]:
     known, entries = without_knowledge(simulation.recording)
     calibration = array.calibrate(known, entries)
     found = {name: {one.key: one for one in estimates} for name, estimates in calibration.imus.items()}
-    gyros = np.linalg.inv([errors.gyro_response for errors in simulation.errors])
-    accels = np.linalg.inv([errors.accel_response for errors in simulation.errors])
+    gyros = np.array([np.linalg.inv(errors.gyro_response) for errors in simulation.errors])
+    accels = np.array([np.linalg.inv(errors.accel_response) for errors in simulation.errors])
     frame = _frame(found, gyros)
     moved = common_motion(known.imus)
     rates = moved.smoothed(np.einsum("nij,tnj->ti", gyros, moved.rate) / len(gyros), moved.instants)
@@ -294,13 +294,13 @@ def find_eight() -> Figures:
 
 
 def mimu4444(data: Mapping[str, Array], own_axes: bool) -> Recording:
-    """Return the recording without the saturated rows, nothing known of it; `own_axes`: each chip's, not the board's."""
+    """Return the recording without the saturated rows; `own_axes`: in each chip's axes, not in the board's."""
     time, grade = data["t"], ImuEntry(name="any", file="none")
     steps = np.diff(time, prepend=time[0] - MIMU_INTERVAL)[:, None]
     streams = []
     for k in range(8):
         turn = OTHER_SIDE if own_axes and k % 2 else np.eye(3)
-        good = ~data["saturated"][:, k]
+        good = np.logical_not(data["saturated"][:, k])
         rates = [mapped(turn, data[name][:, k].astype(float)) * steps for name in ("gyro", "acc")]
         streams.append(ImuStream(f"imu{k + 1}", time[good], rates[0][good], rates[1][good]))
     noise: NoiseGrade = as_mounted(grade).noise
