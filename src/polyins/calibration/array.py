@@ -164,7 +164,11 @@ class _Whole:
         turned = _cross(turns).reshape(-1, 9)
         std = [jackknife_std(one.errors[:, i, :9] - turned).reshape(3, 3) for one in (gyros, accels)]
         gyro_std, accel_std = np.hypot(std[0], _std_of(self.common.gyro)), np.hypot(std[1], _std_of(self.common.accel))
-        angles = np.hypot(jackknife_std(turns), _turned_by(_std_of(self.common.gyro), self.turning)) / DEG
+        across = gyro @ rotation.T
+        # turned evenly about all axes, the same chip would seem mounted otherwise by this
+        uneven = 0.5 * np.array([across[k, j] - across[j, k] for j, k in ((1, 2), (2, 0), (0, 1))])
+        parts = [jackknife_std(turns), _turned_by(_std_of(self.common.gyro), self.turning), uneven]
+        angles = np.linalg.norm(parts, axis=0) / DEG
         names = [", ".join(_axis(row) for row in axes) for axes in (after, before)]
         mounts = [euler_deg(one @ axes.T) for one, axes in ((rotation, after), (imu.rotation, after))]
         axes = () if names[0] == names[1] else (Estimate("axes", names[0], None, names[1]),)
