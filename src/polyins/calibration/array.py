@@ -45,10 +45,11 @@ def calibrate(recording: Recording, entries: Sequence[ImuEntry]) -> Calibration:
             f"calibrate: one IMU alone, held in {len(common.poses)} attitudes that tell too little; expected a second "
             f"one, or at least {9 + poses.SPARE} attitudes, spread evenly, still for {poses.WINDOW:g} s or more each"
         )
-    if common.gyro is not None and common.accel is not None and len(imus) > 1:
-        found = found.with_places(common.gyro.matrix, common.accel.matrix)
+    rate = _rate(found, common)
+    if common.gyro_bias is not None and len(imus) > 1:
+        found = found.with_places(rate, _times(common.accel, np.eye(3)))
     warnings += [*_untold(found), *_without(common)]
-    whole = _Whole(found, common, _turning(found, common))
+    whole = _Whole(found, common, np.cov(found.motion.smoothed(rate, found.motion.instants).T))
     return Calibration(
         {imu.name: whole.estimates(i, imu, by_name[imu.name], imus) for i, imu in enumerate(imus)},
         recording.clock_offsets,
@@ -61,10 +62,10 @@ def calibrate(recording: Recording, entries: Sequence[ImuEntry]) -> Calibration:
     )
 
 
-def _turning(found: Differences, common: Common) -> Array:
-    """Return the covariance of the array's rates, (rad/s)^2, shape (3, 3)."""
-    rates = found.motion.smoothed(found.rate(), found.motion.instants) @ _times(common.gyro, np.eye(3)).T
-    return np.cov(rates.T)
+def _rate(found: Differences, common: Common) -> Array:
+    """Return the array's rate on the grid as far as it is known, rad/s, shape (T, 3)."""
+    bias = np.zeros(3) if common.gyro_bias is None else common.gyro_bias[0]
+    return (found.rate() - bias) @ _times(common.gyro, np.eye(3)).T
 
 
 def _gravity(recording: Recording) -> tuple[float, list[str]]:

@@ -100,17 +100,17 @@ class Differences:
         """Return the mean of the corrected forces on the grid, m/s^2, shape (T, 3); at rest it holds no lever arms."""
         return self.accels.mean(self.motion.force)
 
-    def with_places(self, gyro: Array, accel: Array) -> Differences:
-        """Return the same with what all have in common known: matrices that correct the means, shape (3, 3) each.
+    def with_places(self, rate: Array, accel: Array) -> Differences:
+        """Return the same with what all have in common known.
 
-        Rates that all gyros show too large by a share make places too near by twice that.
+        `rate`: of the body on the grid, rad/s, shape (T, 3); `accel`: what corrects the mean force, shape (3, 3). Rates
+        that all gyros show too large by a share make places too near by twice that.
         """
-        rows = self.motion.instants
-        lever = lever_matrices(self.rate() @ gyro.T, self.motion, rows)
+        lever = lever_matrices(rate, self.motion, self.motion.instants)
         begun = _State(self.accels.matrix, self.accels.bias, self.accels.extra, self.alike)
         added = np.linalg.inv(accel) @ lever
         extra = _by_place(added, self.motion, self.gyros)
-        fitted = _settled(self.motion.smoothed(self.motion.force, rows), begun, extra)
+        fitted = _settled(self.motion.smoothed(self.motion.force, self.motion.instants), begun, extra)
         return replace(self, accels=replace(fitted, before=self.accels.before))
 
 
