@@ -342,19 +342,19 @@ def live(config: Path, sources: tuple[str, ...], sinks: tuple[str, ...], speed: 
 @click.option("--out", type=FILE, default=None, help="File for the configuration; CONFIG's name and -calibrated.")
 @as_json_option
 def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
-    """Estimate from a drive how wheel and body IMUs are mounted, and write a configuration that says it."""
-    from polyins.calibration import listing
+    """Estimate how wheel and body IMUs are mounted, or how the IMUs of an array err, and write a configuration."""
+    from polyins.calibration import array, drive, listing
     from polyins.calibration.configuration import calibrated
-    from polyins.calibration.drive import calibrate as estimate
     from polyins.files import write_bytes
     from polyins.reading.loading import build, read_config
 
     with progress("reading"):
         read = read_config(config)
         settings, document, warnings = read.config, read.document, read.warnings
-        recording = build(settings, document, wheels_known=False)
+        recording = build(settings, document, mounts_known=False)
     with progress("calibrate"):
-        calibration = estimate(recording)
+        wheels = recording.rig.has_wheels
+        calibration = drive.calibrate(recording) if wheels else array.calibrate(recording, settings.imus)
     target = out or document.path.with_name(f"{document.path.stem}-calibrated.yaml")
     moved = target.resolve().parent != document.path.resolve().parent
     text = calibrated(document.values, settings, calibration, document.path.resolve().parent if moved else None)
@@ -366,7 +366,7 @@ def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
     print_table(recording.name, listing.COLUMNS, listing.rows(calibration))
     for warning in (*warnings, *recording.sentences, *calibration.warnings):
         say(f"warning: {warning}")
-    say(f"forward: {calibration.forward_from}")
+    say(f"forward: {calibration.forward_from}" if wheels else listing.agreed(calibration))
     say(f"configuration: {target}")
 
 

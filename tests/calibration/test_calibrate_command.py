@@ -11,12 +11,16 @@ from pymap3d import ned2geodetic
 from simulated_drive import body_stream, drive, fixes, wheel_stream
 
 from polyins.calibration.configuration import calibrated
-from polyins.calibration.drive import Calibration, Estimate
+from polyins.calibration.estimates import Calibration, Estimate
 from polyins.cli import cli
 from polyins.config import parse
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
 from polyins.reading.loading import load
+from polyins.simulation.error_scenario import SensorErrors
+from polyins.simulation.files import write as write_files
+from polyins.studies.calibration import by_hand
+from polyins.studies.chips import draw_chips
 
 RADIUS = 0.29
 PLACE = np.array([0.0, 0.006, -0.05])
@@ -159,10 +163,45 @@ def test_a_recording_without_wheels_is_refused(files: Path) -> None:
     assert not (files / "body-calibrated.yaml").exists()
 
 
+def test_an_array_that_was_turned_by_hand(tmp_path: Path) -> None:
+    """What is written is what the recording is corrected by when it is read again: nothing is left to calibrate."""
+    chips = draw_chips(3, np.random.default_rng(5))
+    simulation = by_hand(5, SensorErrors(scales=False, chips=chips), count=3)
+    values = read_yaml(write_files(simulation.recording, tmp_path)).values
+    del values["reference"], values["outages"]
+    values["filter"] = {"gravity_m_s2": simulation.recording.options.gravity}
+    config = write(tmp_path, "hand.yaml", values)
+    first = reported(command(config, "--json"))
+    assert first["forward_from"] is None
+    assert first["poses"] == 26
+    written = read_yaml(tmp_path / "hand-calibrated.yaml").values["imus"][0]
+    assert np.shape(written["gyro_matrix"]) == (3, 3)
+    assert set(written["initial_std"]) == {"gyro_bias_deg_s", "accel_bias_m_s2", "gyro_scale_ppm", "accel_scale_ppm"}
+    again = reported(command(tmp_path / "hand-calibrated.yaml", "--json"))
+    assert again["agreement"]["configured"]["gyro_deg_s"] == pytest.approx(
+        first["agreement"]["calibrated"]["gyro_deg_s"], rel=0.01
+    )
+    for name in ("imu1", "imu2", "imu3"):
+        for key, close in (("gyro_matrix", 2e-5), ("accel_matrix", 2e-5), ("mount_deg", 1e-3), ("position_m", 1e-5)):
+            one = again["imus"][name][key]
+            np.testing.assert_allclose(one["value"], one["configured"], atol=close)
+        bias = again["imus"][name]["initial_errors.accel_bias_m_s2"]
+        np.testing.assert_allclose(bias["value"], bias["configured"], atol=1e-4)
+
+
+def test_its_table_has_matrices_row_by_row(tmp_path: Path) -> None:
+    chips = draw_chips(2, np.random.default_rng(5))
+    simulation = by_hand(5, SensorErrors(scales=False, chips=chips), count=2)
+    result = command(write_files(simulation.recording, tmp_path))
+    assert result.exit_code == 0, result.exception
+    assert "imu1  accel_matrix z" in result.stdout
+    assert "the IMUs differ by" in result.stderr
+
+
 def test_what_the_drive_hardly_tells_stays_as_configured() -> None:
     """The body's yaw on a robot that hardly accelerates, say."""
     estimate = Estimate("mount_deg", (1.0, 2.0, 7.0), (0.5, 0.2, 17.0), (0.0, 0.1, 0.2))
-    calibration = Calibration({"body": (estimate,)}, "", (), ())
+    calibration = Calibration({"body": (estimate,)}, (), ())
     values = {"imus": [{"name": "body", "file": "body.csv", "mount_deg": [0.0, 0.1, 0.2]}]}
     text = calibrated(values, parse(Document(Path("drive.yaml"), values)), calibration)
     assert "mount_deg: [1.0, 2.0, 0.2]" in text

@@ -13,7 +13,8 @@ from simulated_drive import (
     wheel_stream,
 )
 
-from polyins.calibration.drive import Calibration, Estimate, calibrate
+from polyins.calibration.drive import calibrate
+from polyins.calibration.estimates import Calibration, Estimate
 from polyins.errors import InputError
 from polyins.model.rig import Imu
 

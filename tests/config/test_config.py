@@ -126,6 +126,12 @@ def test_outages_are_a_schedule_or_a_list() -> None:
     assert parsed({"imus": imus, "outages": [[1, 2], [3, 4.5]]}).outages == ((1.0, 2.0), (3.0, 4.5))
 
 
+def test_a_matrix_that_corrects_no_chip_is_refused() -> None:
+    degrees = [[57.3, 0, 0], [0, 57.3, 0], [0, 0, 57.3]]
+    with pytest.raises(InputError, match=r"gyro_matrix.*differs by 56 from the unit matrix"):
+        parsed({"imus": [{"file": "a.csv", "gyro_matrix": degrees}]})
+
+
 def test_what_is_in_force_can_be_written_and_read_again(tmp_path: Path) -> None:
     filled = parsed(
         {
@@ -134,6 +140,7 @@ def test_what_is_in_force_can_be_written_and_read_again(tmp_path: Path) -> None:
                     "file": "a.csv",
                     "axes": ["-z", "y", "x"],
                     "mount_deg": [1, 2, 3],
+                    "gyro_matrix": [[1.002, 0, 0.001], [0, 0.998, 0], [0.003, 0, 1]],
                     "initial_std": {"gyro_scale_ppm": 9},
                 }
             ],

@@ -175,7 +175,7 @@ OTHERWISE: dict[str, set[str]] = {
     "WheelEntry": {"spin_axis", "side", "tilt_deg"},
     "ImuEntry": {
         "format", "columns", "rate_hz", "clock_offset_s", "time_offset", "gyro_range_deg_s", "axes", "mount_deg",
-        "file", "stream",
+        "gyro_matrix", "accel_matrix", "file", "stream",
     },
     "Fixes": {"lies"},
     "WheelModule": {"name", "position_m", "chips", "calibrated", "slip"},

@@ -8,10 +8,12 @@ import pytest
 
 from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
+from polyins.formats.rows import ImuRows, RowSource
 from polyins.live.conversion import Conversion
 from polyins.live.source import RefusedError
 from polyins.navigate.samples import GnssFix, ImuSample
 from polyins.reading import loading
+from polyins.reading.imu_stream import in_array_axes, mount_rotation
 
 IMU = {"name": "a", "axes": ["x", "-y", "-z"], "mount_deg": [0.0, 0.0, 90.0], "clock_offset_s": -2.5}
 FIX = GnssFix(7.0, np.array([0.8, 0.2, 500.0]), np.ones(3), np.ones(3), np.ones(3))
@@ -22,7 +24,7 @@ def conversion(folder: Path, **sections: Any) -> Conversion:
     path.write_text(write_yaml({"imus": [IMU, {"name": "b"}], **sections}))
     settings = loading.read_config(path)
     recording, _ = loading.without_data(settings.config, settings.document)
-    return Conversion(settings.config, recording.rig, recording.geodetic)
+    return Conversion(settings.config, recording.geodetic)
 
 
 def refusal(one: Conversion, sample: ImuSample | GnssFix) -> str:
@@ -41,6 +43,22 @@ def test_increments_are_turned_and_clocks_put_right(tmp_path: Path) -> None:
     same = one.taken(ImuSample("b", 10.0, np.array([1.0, 2.0, 3.0]), np.zeros(3)))
     np.testing.assert_array_equal(same.dtheta, [1.0, 2.0, 3.0])
     assert refusal(one, same._replace(imu="c")) == "unknown IMU"
+
+
+def test_matrices_correct_as_in_a_recording_to_the_last_bit(tmp_path: Path) -> None:
+    matrix = [[1.002, 0.003, -0.001], [-0.002, 0.999, 0.004], [0.001, 0.002, 1.001]]
+    corrected = {**IMU, "mount_deg": [1.0, 2.0, 30.0], "gyro_matrix": matrix}
+    one = conversion(tmp_path, imus=[corrected])
+    entry = loading.read_config(tmp_path / "live.yaml").config.imus[0]
+    dtheta, dvel = np.random.default_rng(1).normal(size=(2, 50, 3))
+    rows = ImuRows(RowSource("live"), np.arange(50.0), dtheta, dvel)
+    stream = in_array_axes(rows, entry)
+    taken = [one.taken(ImuSample("a", *values)) for values in zip(rows.time, dtheta, dvel, strict=True)]
+    np.testing.assert_array_equal([sample.dtheta for sample in taken], stream.dtheta)
+    np.testing.assert_array_equal([sample.dvel for sample in taken], stream.dvel)
+    expected = mount_rotation((1.0, 2.0, 30.0)) @ np.diag([1.0, -1.0, -1.0])
+    np.testing.assert_allclose(stream.dtheta, dtheta @ (expected @ matrix).T, atol=1e-12)
+    np.testing.assert_allclose(stream.dvel, dvel @ expected.T, atol=1e-12)
 
 
 def test_fixes_as_configured(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from polyins.calibration.drive import Calibration, calibrate
+from polyins.calibration.drive import calibrate
+from polyins.calibration.estimates import Calibration
 from polyins.calibration.offsets import gnss_offset, imu_offsets
 from polyins.config.yaml_document import read_yaml
 from polyins.model.recording import Recording

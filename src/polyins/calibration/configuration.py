@@ -7,7 +7,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from polyins.calibration.drive import ASIDE, Calibration, Estimate
+from polyins.calibration.estimates import ASIDE, Calibration, Estimate
 from polyins.config import Config
 from polyins.config.yaml_document import write_yaml
 from polyins.model.recording import Offset
@@ -21,14 +21,14 @@ WEAKEST = {"mount_deg": 1.5}
 def calibrated(values: Values, config: Config, calibration: Calibration, folder: Path | None = None) -> str:
     """Return `values`, what a configuration says, as YAML with the estimates in the place of what was there.
 
-    `config`: the same, filled in. Components that the drive hardly tells (`WEAKEST`) stay as they are. With `folder`
-    relative file names are put into it, so that the text may stand in another one. Clock offsets that were found take
-    the place of `time_offset: estimate`.
+    `config`: the same, filled in. Components that the recording hardly tells (`WEAKEST`) stay as they are. With
+    `folder` relative file names are put into it, so that the text may stand in another one. Clock offsets that were
+    found take the place of `time_offset: estimate`.
     """
     new = deepcopy(values)
     found = {offset.name: offset for offset in calibration.clock_offsets}
     for raw, entry in zip(new["imus"], config.imus, strict=True):
-        for estimate in calibration.imus[entry.name]:
+        for estimate in calibration.imus.get(entry.name, ()):
             _put(raw, estimate)
         _settle(raw, entry.clock_offset_s, found.get(entry.name))
     (new.get("imu_defaults") or {}).pop("time_offset", None)
@@ -48,11 +48,12 @@ def _put(raw: Values, estimate: Estimate) -> None:
     *sections, key = estimate.key.split(".")
     for section in sections:
         raw = raw.setdefault(section, {})
-    raw[key] = _plain(_believed(key, estimate))
+    believed = _plain(_believed(key, estimate))
+    raw[key] = [believed[row : row + 3] for row in (0, 3, 6)] if key.endswith("_matrix") else believed
 
 
 def _believed(key: str, estimate: Estimate) -> tuple[float, ...] | str:
-    """Return the estimate, but what was configured where the drive hardly tells."""
+    """Return the estimate, but what was configured where the recording hardly tells."""
     value, std, configured = estimate.value, estimate.std, estimate.configured
     if key not in WEAKEST or std is None or isinstance(value, str) or isinstance(configured, str):
         return value
@@ -68,13 +69,13 @@ def _plain(value: tuple[float, ...] | str) -> Any:
 
 def _settle(raw: Values, configured: float, found: Offset | None) -> None:
     if found is not None:
-        raw["clock_offset_s"] = round(configured + found.offset_s, DIGITS)
+        raw["clock_offset_s"] = round(raw.get("clock_offset_s", configured) + found.offset_s, DIGITS)
         raw.pop("time_offset", None)
 
 
 def _heading(calibration: Calibration) -> str:
     """Say how sure the estimates are, in comments."""
-    lines = ["# Calibrated from a drive by polyins; standard deviations:"]
+    lines = ["# Calibrated from a recording by polyins; standard deviations:"]
     for name, estimates in calibration.imus.items():
         parts = [f"{one.key} {_numbers(one.std)}" for one in estimates if one.std and not one.key.startswith(ASIDE)]
         lines.append(f"#   {name}: " + "; ".join(parts))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from polyins.calibration.body import mount
+from polyins.calibration.estimates import ASIDE, Calibration, Estimate, nearest_axes
 from polyins.calibration.motion import Motion, RunningSums, motion
 from polyins.calibration.radius import rolling_radius
 from polyins.calibration.wheels import SpinAxis, lever_arm, spin_axis, turns
@@ -15,37 +16,12 @@ from polyins.config import WheelEntry
 from polyins.config.wheel_mount import wheel_rotation
 from polyins.errors import InputError
 from polyins.model.geodesy import displacement
-from polyins.model.recording import Array, Offset, Recording
+from polyins.model.recording import Array, Recording
 from polyins.model.rig import DEG, Imu
 
-ASIDE = "~"
 CLEAR_SENSE = 0.5
 """Correlation of wheel and body acceleration above which it says which way is forward."""
 SENSE_WINDOW = 1.0  # s
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One setting of an IMU, in the configuration's unit."""
-
-    key: str
-    """as in the configuration, like `wheel.radius_m`; what the configuration does not have begins with `ASIDE`"""
-    value: tuple[float, ...] | str
-    std: tuple[float, ...] | None
-    """None: of an estimate in words"""
-    configured: tuple[float, ...] | str
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """What a drive tells."""
-
-    imus: dict[str, tuple[Estimate, ...]]
-    """by the IMU's name"""
-    forward_from: str
-    """how it was found which way is forward"""
-    clock_offsets: tuple[Offset, ...]
-    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -90,7 +66,7 @@ def calibrate(recording: Recording) -> Calibration:
         imus[imu.name] = _body_estimates(imu, moved, rolled, height)
     warnings += [text for name, estimates in imus.items() for text in _surprises(name, estimates)]
     in_order = {imu.name: imus[imu.name] for imu, _ in mounted}
-    return Calibration(in_order, forward_from, recording.clock_offsets, tuple(warnings))
+    return Calibration(in_order, recording.clock_offsets, tuple(warnings), forward_from)
 
 
 def _rolling(imu: Imu, moved: Motion) -> _WheelMotion:
@@ -212,7 +188,7 @@ def _body_estimates(imu: Imu, moved: Motion, rolled: RunningSums, height: Runnin
     from scipy.spatial.transform import Rotation
 
     found = mount(moved, rolled, height, imu.name)
-    axes = _nearest_axes(imu.rotation)
+    axes = nearest_axes(imu.rotation)
     nominal = Rotation.from_matrix(imu.rotation @ axes.T)
     true = Rotation.from_euler("ZYX", found.angles[::-1]) * nominal
     degrees = [rotation.as_euler("ZYX", degrees=True)[::-1].tolist() for rotation in (true, nominal)]
@@ -222,14 +198,6 @@ def _body_estimates(imu: Imu, moved: Motion, rolled: RunningSums, height: Runnin
         Estimate("axes", names, None, names),
         Estimate("mount_deg", tuple(degrees[0]), std, tuple(degrees[1])),
     )
-
-
-def _nearest_axes(rotation: Array) -> Array:
-    """Return the permutation of axes, with signs, that is nearest to a rotation, shape (3, 3)."""
-    from polyins.model.axes import axes_matrix, right_handed_axes
-
-    matrices = [axes_matrix(axes) for axes in right_handed_axes()]
-    return max(matrices, key=lambda matrix: float(np.sum(matrix * rotation)))
 
 
 def _surprises(name: str, estimates: Sequence[Estimate]) -> list[str]:

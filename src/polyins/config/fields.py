@@ -67,6 +67,8 @@ NotNegative = Annotated[float, BeforeValidator(lambda value: _not_below_zero(num
 Positive = Annotated[float, BeforeValidator(lambda value: _positive(number(value)))]
 Pair = Annotated[tuple[float, float], BeforeValidator(_two)]
 Triple = Annotated[tuple[float, float, float], BeforeValidator(_three)]
+Matrix = tuple[Triple, Triple, Triple]
+"""three rows of three"""
 PerAxis = Annotated[tuple[float, float, float], BeforeValidator(_one_or_three)]
 """One number or three; held as three."""
 Spread = Annotated[tuple[float, float, float], BeforeValidator(lambda value: _not_negative(_one_or_three(value)))]
@@ -80,6 +82,7 @@ Column = str | int
 ThreeColumns = tuple[Column, Column, Column]
 
 ORIGIN = (0.0, 0.0, 0.0)
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 AT_KEY = "at_key"
 """Type of an error whose context names the `key` of the section that is to blame, and the `problem`."""

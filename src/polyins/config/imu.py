@@ -5,10 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from polyins.config.columns import ImuColumns
-from polyins.config.fields import ORIGIN, NotNegative, Number, PerAxis, Positive, Section, Spread, Triple, blame
+from polyins.config.fields import (
+    IDENTITY,
+    ORIGIN,
+    Matrix,
+    NotNegative,
+    Number,
+    PerAxis,
+    Positive,
+    Section,
+    Spread,
+    Triple,
+    blame,
+)
 from polyins.config.rolling import WheelEntry
 from polyins.config.sensor_noise import KNOWN_IMUS
 
@@ -48,6 +61,9 @@ NOISE_BY_NAME: dict[str, dict[str, float]] = NOISE_GRADES | {
     for name, imu in KNOWN_IMUS.items()
 }
 """What `noise` may be by name: a grade, or an IMU whose figures have a source."""
+
+LARGEST_CORRECTION = 0.3
+"""of an element of a matrix: what is off by more is a wrong unit or other axes"""
 
 FORWARD_RIGHT_DOWN = ("x", "y", "z")
 
@@ -138,6 +154,11 @@ class ImuSettings(Section):
     gyro_range_deg_s: Positive | None = None
     """full scale of the gyro, deg/s: what reaches it is left out; the larger, the less is; without it that of the
     format, where it is known"""
+    gyro_matrix: Matrix = IDENTITY
+    """three rows of three, in the sensor's axes, before `axes` and mount_deg: corrected = matrix x measured; the
+    diagonal corrects scale factors, the rest cross-axis errors"""
+    accel_matrix: Matrix = IDENTITY
+    """the same of the accelerometers"""
     axes: Annotated[tuple[str, str, str], BeforeValidator(_axis_names)] = FORWARD_RIGHT_DOWN
     """which sensor axes point forward, right and down in the array"""
     mount_deg: Triple = ORIGIN
@@ -167,6 +188,14 @@ class ImuSettings(Section):
         else:
             return self
         raise blame("axes", f"{problem}; expected right-handed ones, like [x, -y, -z]")
+
+    @model_validator(mode="after")
+    def _matrices_correct(self) -> Self:
+        for key in ("gyro_matrix", "accel_matrix"):
+            off = np.abs(np.array(getattr(self, key)) - np.eye(3)).max()
+            if off > LARGEST_CORRECTION:
+                raise blame(key, f"differs by {off:.2g} from the unit matrix; expected at most {LARGEST_CORRECTION:g}")
+        return self
 
     @model_validator(mode="after")
     def _wheel_or_mount(self) -> Self:

@@ -6,17 +6,18 @@ import numpy as np
 
 from polyins.config import Config
 from polyins.live.source import RefusedError
-from polyins.model.rig import Rig
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
-from polyins.reading import sensor_stream
+from polyins.reading import imu_stream, sensor_stream
 from polyins.reading.position_stream import height_shift, on_plane
 
 
 class Conversion:
     """What a configuration says of mounts, clocks, heights and accuracies, applied to one sample at a time."""
 
-    def __init__(self, config: Config, rig: Rig, geodetic: bool) -> None:
-        self.rotations = {imu.name: _unless_identity(imu.rotation) for imu in rig.imus}
+    def __init__(self, config: Config, geodetic: bool) -> None:
+        self.matrices = {
+            entry.name: tuple(map(_unless_identity, imu_stream.to_array_axes(entry))) for entry in config.imus
+        }
         self.offsets = {entry.name: entry.clock_offset_s for entry in config.imus}
         self.gnss = config.gnss
         self.sensors = dict(sensor_stream.entries(config))
@@ -29,12 +30,11 @@ class Conversion:
         return self._imu(sample) if isinstance(sample, ImuSample) else self._fix(sample)
 
     def _imu(self, sample: ImuSample) -> ImuSample:
-        if sample.imu not in self.rotations:
+        if sample.imu not in self.matrices:
             raise RefusedError("unknown IMU")
-        rotation, time = self.rotations[sample.imu], sample.time + self.offsets[sample.imu]
-        if rotation is None:
-            return sample._replace(time=time)
-        return ImuSample(sample.imu, time, rotation @ sample.dtheta, rotation @ sample.dvel)
+        gyro, accel = self.matrices[sample.imu]
+        time = sample.time + self.offsets[sample.imu]
+        return ImuSample(sample.imu, time, _mapped(gyro, sample.dtheta), _mapped(accel, sample.dvel))
 
     def _sensor(self, sample: SensorSample) -> SensorSample:
         entry = self.sensors.get(sample.kind)
@@ -76,5 +76,10 @@ class Conversion:
         return position
 
 
-def _unless_identity(rotation: Array) -> Array | None:
-    return None if np.array_equal(rotation, np.eye(3)) else rotation
+def _mapped(matrix: Array | None, increment: Array) -> Array:
+    # as a recording is read, to the last bit, which matrix @ increment is not
+    return increment if matrix is None else np.einsum("ij,j->i", matrix, increment)
+
+
+def _unless_identity(matrix: Array) -> Array | None:
+    return None if np.array_equal(matrix, np.eye(3)) else matrix

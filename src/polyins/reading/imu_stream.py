@@ -11,6 +11,7 @@ from polyins.checks import stream_checks
 from polyins.checks.faults import clipped, without_faults
 from polyins.checks.no_data import within_any_range, without_nonsense
 from polyins.config import ImuEntry, InitialStd
+from polyins.config.fields import IDENTITY, Matrix
 from polyins.config.units import read
 from polyins.config.wheel_mount import wheel_rotation
 from polyins.config.yaml_document import Document
@@ -86,9 +87,18 @@ def measured(rows: ImuRows, entry: ImuEntry, *, alone: bool, first_row: int = 0)
 
 def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
     """Return rows as increments in array axes, on a wheel in the module's, on the recording's clock."""
+    gyro, accel = to_array_axes(entry)
+    return ImuStream(entry.name, rows.time + entry.clock_offset_s, mapped(gyro, rows.dtheta), mapped(accel, rows.dvel))
+
+
+def to_array_axes(entry: ImuEntry) -> tuple[Array, Array]:
+    """Return the matrices that correct increments of gyro and accelerometers and turn them, shape (3, 3) each."""
     rotation = sensor_rotation(entry)
-    dtheta, dvel = _turned(rotation, rows.dtheta), _turned(rotation, rows.dvel)
-    return ImuStream(entry.name, rows.time + entry.clock_offset_s, dtheta, dvel)
+    return _corrected_then(rotation, entry.gyro_matrix), _corrected_then(rotation, entry.accel_matrix)
+
+
+def _corrected_then(rotation: Array, matrix: Matrix) -> Array:
+    return rotation if matrix == IDENTITY else np.asarray(rotation @ np.array(matrix))
 
 
 def as_mounted(entry: ImuEntry) -> Imu:
@@ -159,11 +169,12 @@ def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:
     return mount_rotation(entry.mount_deg) @ axes_matrix(entry.axes)
 
 
-def _turned(rotation: Array, increments: Array) -> Array:
-    if np.array_equal(rotation, np.eye(3)):
+def mapped(matrix: Array, increments: Array) -> Array:
+    """Return matrix @ increment of each row, shape (T, 3)."""
+    if np.array_equal(matrix, np.eye(3)):
         return increments
     # a matrix product would wake every BLAS thread for a 3 x 3 matrix
-    return np.asarray(np.einsum("ij,tj->ti", rotation, increments))
+    return np.asarray(np.einsum("ij,tj->ti", matrix, increments))
 
 
 def mount_rotation(mount_deg: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -101,10 +101,11 @@ def located(document: Document) -> Config:
     return _with_absolute_paths(config, folder, document.path)
 
 
-def build(config: Config, document: Document, wheels_known: bool = True) -> Recording:
+def build(config: Config, document: Document, mounts_known: bool = True) -> Recording:
     """Read and check the streams that a configuration names.
 
-    `wheels_known`: check that wheels turn as declared; what calibrates them needs not know yet.
+    `mounts_known`: check that wheels turn as declared and arrays stand upright; what calibrates them needs not know
+    yet, and arrays are turned upside down for it.
     """
     notes = wheel_checks.check_settings(config, document)
     alone = len(config.imus) == 1
@@ -113,7 +114,10 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     notes += one_by_kind([text for i in alive for text in found[i].check()])
     measuring = [found[i] for i in alive]
     faults.check_distinct([one.stream for one in measuring])
-    kept, fallen = usable.upright([one.entry for one in measuring], alive, [one.stream for one in measuring], document)
+    kept, fallen = list(range(len(measuring))), usable.NONE
+    if mounts_known:
+        streams_of = [one.stream for one in measuring]
+        kept, fallen = usable.upright([one.entry for one in measuring], alive, streams_of, document)
     known, config = config, config.model_copy(update={"imus": tuple(measuring[i].entry for i in kept)})
     imus, streams = tuple(measuring[i].imu for i in kept), tuple(measuring[i].stream for i in kept)
     config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
@@ -124,7 +128,7 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     findings = (*dead, *fallen, *apart, *(finding for one in measuring for finding in one.findings))
     spans = {stream.name: (stream.time[0], stream.time[-1]) for stream in streams}
     span = stream_checks.check_common_span(spans, wait=any(imu.wheel for imu in imus))
-    recording = assemble(config, document, imus, streams, span, wheels_known)
+    recording = assemble(config, document, imus, streams, span, mounts_known)
     warnings = (*notes, *recording.warnings)
     text = in_force(known.model_copy(update={"gnss": config.gnss}), offsets)
     return replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
@@ -136,7 +140,7 @@ def assemble(
     imus: tuple[Imu, ...],
     streams: tuple[ImuStream, ...],
     span: tuple[float, float],
-    wheels_known: bool = True,
+    mounts_known: bool = True,
 ) -> Recording:
     """Read what a configuration names beside the IMUs, whose data cover `span`, and put all together."""
     notes: list[str] = []
@@ -145,7 +149,7 @@ def assemble(
     if config.gnss:
         gnss, geodetic, heights, texts = read_gnss(config.gnss, document, span)
         notes += texts
-    if wheels_known:
+    if mounts_known:
         notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
     if config.reference:
         reference, kind, texts = read_reference(config.reference, document, span)

@@ -18,6 +18,7 @@ from polyins.prepare.timesync import LEAST_COMMON
 from polyins.reading.imu_stream import as_mounted
 
 Findings = tuple[Finding, ...]
+NONE: Findings = ()
 
 
 def upright(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from polyins.config import NotNegative, Number, Section, Triple
+from polyins.config.fields import IDENTITY, Matrix
 from polyins.config.units import in_si, read
 from polyins.model.rig import ImuErrors, NoiseGrade
 from polyins.simulation.imu_errors import Imperfections
@@ -18,10 +19,8 @@ from polyins.simulation.triads import Chip, TriadCalibration
 
 Array = NDArray[np.float64]
 
-Matrix = tuple[Triple, Triple, Triple]
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 
-IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 NOTHING = (0.0, 0.0, 0.0)
 
 VIBRATION_SPEED = 10.0  # m/s

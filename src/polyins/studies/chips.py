@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.config import Number, Section, Triple
+from polyins.config.fields import IDENTITY, Matrix
 from polyins.model.recording import ImuStream
 from polyins.model.rig import DEG
-from polyins.simulation.error_scenario import IDENTITY, ChipCalibration, Matrix
+from polyins.simulation.error_scenario import ChipCalibration
 from polyins.studies.scenario_files import read
 
 Array = NDArray[np.float64]

@@ -35,6 +35,12 @@ TARGETS = (
         seconds=(12, 120),
     ),
     Target(
+        "calibration",
+        "polyins.studies.calibration:reproduce",
+        datasets=("quadrotor", "mimu4444", "whu-array"),
+        seconds=(40, 240),
+    ),
+    Target(
         "lies",
         "polyins.studies.robustness.lies:reproduce",
         seconds=(10, 30),
