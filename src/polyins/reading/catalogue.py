@@ -69,11 +69,6 @@ DATASETS = {
         licence="see the source",
         source="https://github.com/i2Nav-WHU/Wheel-INS",
     ),
-    "mimu4444": Dataset(
-        summary="a board of 8 MPU-9150, 62.5 Hz: 20 attitudes held, then shaken by hand for a minute",
-        licence="MIT",
-        source="https://github.com/hcarlsso/Self-Calibration-Inertial-Sensor-Arrays-BCD.jl",
-    ),
     "wheelins-parity": Dataset(
         summary="a simulated wheel IMU of 300 s in Wheel-INS's formats, its truth, and what Wheel-INS computes from it",
         licence="made for polyins",
