@@ -22,7 +22,7 @@ def conversion(folder: Path, **sections: Any) -> Conversion:
     path.write_text(write_yaml({"imus": [IMU, {"name": "b"}], **sections}))
     settings = loading.read_config(path)
     recording, _ = loading.without_data(settings.config, settings.document)
-    return Conversion(settings.config, recording.rig, recording.geodetic)
+    return Conversion(settings.config, recording.geodetic)
 
 
 def refusal(one: Conversion, sample: ImuSample | GnssFix) -> str:

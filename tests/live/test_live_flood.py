@@ -50,7 +50,7 @@ def navigated(config: Path, datagrams: list[tuple[str, bytes]], samples: int) ->
 
     settings = loading.read_config(config)
     blank, _ = loading.without_data(settings.config, settings.document)
-    conversion = Conversion(settings.config, blank.rig, blank.geodetic)
+    conversion = Conversion(settings.config, blank.geodetic)
     source, kept = Datagrams("udp://127.0.0.1:0", ("127.0.0.1", 0), lines_of), Kept()
     begin = partial(Navigator, blank.rig, method="enav-fusion", options=blank.options, delay=DELAY)
     session = Session(Starter(blank, DELAY, needs_fix=True), begin, [Outlet(kept, 50.0)])

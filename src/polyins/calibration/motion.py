@@ -18,6 +18,8 @@ class RunningSums:
     """s, shape (T + 1,)"""
     sums: Array
     """shape (T + 1, K)"""
+    least: float = 0.003
+    """rms of what happens in a window, below which it is no motion; of angles, rad"""
 
     @property
     def span(self) -> tuple[float, float]:

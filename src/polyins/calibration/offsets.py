@@ -3,7 +3,8 @@
 Each stream is reduced to a few signals that need no knowledge of its mounting: the three rates of a body, the spin and
 the yaw of a wheel, the distances between GNSS fixes. Two streams on the right offset explain each other linearly. How
 well is the mutual information of Gaussian signals, -1/2 sum ln(1 - rho_i^2) with their canonical correlations rho_i:
-its product with the common time is the gain of log likelihood, which is compared over all offsets.
+its product with the common time is the gain of log likelihood, which is compared over all offsets. About the best one
+the signals are linear in offset, drift and leaps, and least squares find these.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from typing import Protocol
 
 import numpy as np
 
+from polyins.calibration.clock_line import Pair
 from polyins.calibration.motion import RunningSums, motion
-from polyins.calibration.regression import BLOCKS, blocks, huber, jackknife_covariance
+from polyins.calibration.regression import huber
 from polyins.calibration.wheels import spin_axis, turns
 from polyins.errors import InputError
 from polyins.model.geodesy import displacement
@@ -28,7 +30,12 @@ COARSE_STEP = 0.05  # s
 FINE_STEP = 0.1  # s, from one window to the next
 FINE_REACH = 0.1  # s, to both sides
 FINE_TRIALS = 41
-SHORTEST_COMMON = 20.0  # s
+SHORTEST_COMMON = 20.0
+"""windows"""
+SHORT_WINDOW = 0.2
+"""s: of bodies that are one rigid thing, all of whose turns are shared"""
+ATTITUDE_WINDOW = 0.5
+"""s: over less, what a coarse attitude changes by is its resolution"""
 SMALLEST_SHARE = 0.2  # of the shorter stream
 NOISE = 0.01
 """of the variance, added in the coarse search: on its grid no offset fits better than so, and none wins by rounding"""
@@ -38,8 +45,6 @@ RIVAL = 0.7
 """A second peak with this part of the first one's information makes the offset ambiguous."""
 LOBE = 3.0  # s: nearer than this it is the same peak
 LEAST_CORRELATION = 0.8
-LEAST_TURN = 0.003  # rad, rms over a window: less is no motion
-LEAST_DISTANCE = 0.2  # m
 
 
 class Signals(Protocol):
@@ -48,6 +53,10 @@ class Signals(Protocol):
     @property
     def span(self) -> tuple[float, float]:
         """First and last instant, s."""
+
+    @property
+    def least(self) -> float:
+        """Rms of what happens in a window, below which it is no motion."""
 
     def between(self, begin: Array, end: Array) -> Array:
         """Return what happened from `begin` to `end`, shape (M, K)."""
@@ -61,6 +70,8 @@ class Positions:
     """s, shape (M,)"""
     position: Array
     """m north, east, shape (M, 2)"""
+    least: float = 0.2
+    """m"""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -78,6 +89,8 @@ class Mean:
     """The mean of several streams on one clock: of the wheels on both sides it is the middle of the axle's."""
 
     parts: Sequence[RunningSums]
+    least: float = 0.003
+    """rad"""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -124,17 +137,17 @@ def gnss_offset(
     return find_offset(name, path, "the wheels", rolling)
 
 
-def find_offset(name: str, signals: Signals, base_name: str, base: Signals) -> Offset:
+def find_offset(name: str, signals: Signals, base_name: str, base: Signals, window: float = WINDOW) -> Offset:
     """Find what to add to the stamps of `signals` to put them on the clock of `base`.
 
-    All offsets are searched that leave 20 s, and a fifth of the shorter stream, in common; the best one is refined to
-    a fraction of a sample. Its std is that of estimates which leave out an eighth of the time each. Raises InputError
-    for no common motion and for an ambiguous offset.
+    All offsets are searched that leave twenty windows, of `window` s, and a fifth of the shorter stream, in common; the
+    best one is refined to a fraction of a sample, with a drift and leaps. Their std is that of estimates which leave
+    out an eighth of the time each. Raises InputError for no common motion and for an ambiguous offset.
     """
     pair = f"{name} and {base_name}"
-    coarse = _search(signals, base, pair)
+    coarse = search(signals, base, pair, window)
     for _ in range(3):
-        offset, std, correlation, at_edge = _refine(signals, base, coarse)
+        offset, correlation, at_edge = _refine(signals, base, coarse, window)
         if not at_edge:
             break
         coarse = offset
@@ -143,7 +156,10 @@ def find_offset(name: str, signals: Signals, base_name: str, base: Signals) -> O
             f"time_offset: {pair} share no common motion (correlation {correlation:.2f} at best); expected streams of "
             "one drive"
         )
-    return Offset(name, offset, std, correlation)
+    line = Pair(signals, base, window).line(offset)
+    clock, std = line.clock, line.std.tolist()
+    leaps = tuple((at, size, sure) for (at, size), sure in zip(clock.leaps, std[2:], strict=True))
+    return Offset(name, clock.offset, std[0], correlation, clock.drift, std[1], clock.reference, leaps)
 
 
 def _hub(imus: Sequence[Imu], base: int) -> int:
@@ -165,13 +181,32 @@ def none(name: str) -> Offset:
 
 def chained(one: Offset, onward: Offset) -> Offset:
     """Return the offset of `one` to the clock to which `onward` leads from that of its base."""
-    std = float(np.hypot(one.std_s, onward.std_s))
-    return Offset(one.name, one.offset_s + onward.offset_s, std, min(one.correlation, onward.correlation))
+    clock = one.clock.then(onward.clock)
+    at = clock.reference
+    away = one.clock.common(at) - onward.reference_s if onward.drift else 0.0
+    apart = at - one.reference_s if one.drift else 0.0
+    std = float(np.linalg.norm([one.std_s, one.drift_std * apart, onward.std_s, onward.drift_std * away]))
+    sure = [sure for *_, sure in (*one.leaps, *onward.leaps)]
+    known = [value for value in (one.correlation, onward.correlation) if value is not None]
+    return Offset(
+        one.name,
+        clock.offset,
+        std,
+        min(known) if known else None,
+        clock.drift,
+        float(np.hypot(one.drift_std, onward.drift_std)),
+        clock.reference,
+        tuple((*leap, max(sure)) for leap in clock.leaps),
+    )
 
 
 def reversed_offset(one: Offset, name: str) -> Offset:
     """Return what to add to the other clock instead, whose stream has that name."""
-    return replace(one, name=name, offset_s=-one.offset_s)
+    clock = one.clock.inverse
+    leaps = tuple((*leap, std) for leap, (*_, std) in zip(clock.leaps, one.leaps, strict=True))
+    return replace(
+        one, name=name, offset_s=clock.offset, drift=clock.drift, reference_s=clock.reference, leaps=leaps
+    )
 
 
 def _imu_signals(imu: Imu, stream: ImuStream) -> RunningSums:
@@ -182,23 +217,23 @@ def _imu_signals(imu: Imu, stream: ImuStream) -> RunningSums:
     return RunningSums(spin_and_yaw.edges, spin_and_yaw.sums[:, :1]) if imu.wheel.steering else spin_and_yaw
 
 
-def _windows(signals: Signals, step: float) -> tuple[Array, Array]:
+def _windows(signals: Signals, step: float, window: float) -> tuple[Array, Array]:
     """Return the middles of windows every `step` seconds, shape (M,), and what happened in them, shape (M, K)."""
     begin, end = signals.span
-    middle = np.arange(begin + 0.5 * WINDOW, end - 0.5 * WINDOW, step)
-    return middle, signals.between(middle - 0.5 * WINDOW, middle + 0.5 * WINDOW)
+    middle = np.arange(begin + 0.5 * window, end - 0.5 * window, step)
+    return middle, signals.between(middle - 0.5 * window, middle + 0.5 * window)
 
 
-def _search(signals: Signals, base: Signals, pair: str) -> float:
+def search(signals: Signals, base: Signals, pair: str, window: float = WINDOW) -> float:
     """Return the offset with the most information, to a step of the grid; raise InputError if there are rivals."""
-    time, one = _windows(signals, COARSE_STEP)
-    base_time, two = _windows(base, COARSE_STEP)
-    least = SHORTEST_COMMON + SMALLEST_SHARE * (min(len(one), len(two)) * COARSE_STEP - SHORTEST_COMMON)
-    if min(len(one), len(two)) * COARSE_STEP < SHORTEST_COMMON:
-        raise InputError(f"time_offset: {pair}: one has less than {SHORTEST_COMMON:g} s of data; expected more")
+    time, one = _windows(signals, COARSE_STEP, window)
+    base_time, two = _windows(base, COARSE_STEP, window)
+    shortest = SHORTEST_COMMON * window
+    least = shortest + SMALLEST_SHARE * (min(len(one), len(two)) * COARSE_STEP - shortest)
+    if min(len(one), len(two)) * COARSE_STEP < shortest:
+        raise InputError(f"time_offset: {pair}: one has less than {shortest:g} s of data; expected more")
     for windows, source in ((one, signals), (two, base)):
-        limit = LEAST_DISTANCE if isinstance(source, Positions) else LEAST_TURN
-        if np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=0)).max() < limit:
+        if np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=0)).max() < source.least:
             raise InputError(f"time_offset: {pair} share no common motion: one hardly moves; expected a drive")
     lags, gain = _gains(one, two, least / COARSE_STEP)
     best = int(np.argmax(gain))
@@ -263,24 +298,24 @@ def _information(aa: Array, bb: Array, ab: Array, noise: float) -> Array:
     return np.asarray(-0.5 * np.log(np.maximum(np.linalg.det(left), np.finfo(float).tiny)))
 
 
-def _refine(signals: Signals, base: Signals, coarse: float) -> tuple[float, float, float, bool]:
-    """Return the offset with the most information near `coarse`, its std, the correlation, and if it lies at an edge.
+def _refine(signals: Signals, base: Signals, coarse: float, window: float) -> tuple[float, float, bool]:
+    """Return the offset with the most information near `coarse`, the correlation, and if it lies at an edge.
 
     Windows that do not fit count less (Huber).
     """
     begin, end = signals.span
     first, last = base.span
-    reach = 0.5 * WINDOW + FINE_REACH + COARSE_STEP
+    half = 0.5 * window
+    reach = half + FINE_REACH + COARSE_STEP
     middle = np.arange(max(begin, first - coarse) + reach, min(end, last - coarse) - reach, FINE_STEP)
-    windows = (middle - 0.5 * WINDOW, middle + 0.5 * WINDOW)
+    windows = (middle - half, middle + half)
     one = _standard(signals.between(*windows))
     weights = _weights(one, base.between(windows[0] + coarse, windows[1] + coarse))
     trials = coarse + np.linspace(-FINE_REACH, FINE_REACH, FINE_TRIALS)
-    gains = np.array([_left_out(one, _standard(base.between(*(w + t for w in windows))), weights) for t in trials])
-    peaks = np.array([_peak(trials, gain) for gain in gains.T])
-    correlation = float(np.sqrt(-np.expm1(-2.0 * gains[:, 0].max())))
-    std = float(np.sqrt(jackknife_covariance(peaks[1:, None])[0, 0]))
-    return float(peaks[0]), std, correlation, bool(abs(peaks[0] - coarse) > 0.9 * FINE_REACH)
+    gains = np.array([_gain(one, _standard(base.between(*(w + t for w in windows))), weights) for t in trials])
+    peak = _peak(trials, gains)
+    correlation = float(np.sqrt(-np.expm1(-2.0 * gains.max())))
+    return peak, correlation, bool(abs(peak - coarse) > 0.9 * FINE_REACH)
 
 
 def _weights(one: Array, two: Array) -> Array:
@@ -290,17 +325,11 @@ def _weights(one: Array, two: Array) -> Array:
     return np.asarray(np.prod([huber(column) for column in residuals.T], axis=0))
 
 
-def _left_out(one: Array, two: Array, weights: Array) -> Array:
-    """Return the mutual information over all windows, then over those without each block, shape (1 + BLOCKS,)."""
-    both = np.column_stack([np.ones(len(one)), one, two])
-    block = blocks(len(one))
-    moments = np.array([(both[block == b].T * weights[block == b]) @ both[block == b] for b in range(BLOCKS)])
-    whole = moments.sum(axis=0)
-    used = np.concatenate([whole[None], whole - moments])
-    means = used / used[:, :1, :1]
-    covariance = means[:, 1:, 1:] - means[:, 1:, :1] @ means[:, :1, 1:]
+def _gain(one: Array, two: Array, weights: Array) -> float:
+    """Return the mutual information over all windows."""
+    covariance = np.cov(np.column_stack([one, two]).T, aweights=weights, ddof=0)
     k = one.shape[1]
-    return _information(covariance[:, :k, :k], covariance[:, k:, k:], covariance[:, :k, k:], IDLE)
+    return float(_information(covariance[:k, :k], covariance[k:, k:], covariance[:k, k:], IDLE))
 
 
 def _peak(at: Array, values: Array) -> float:

@@ -67,7 +67,7 @@ class Inertial:
 
 
 @dataclass(frozen=True)
-class Clock:
+class ClockTerms:
     """The terms of what is added to the stamps of a stream, one column each."""
 
     columns: Mapping[str, Array]
@@ -76,20 +76,21 @@ class Clock:
     """shape (P,)"""
     std: Array
     """known beforehand, shape (P,)"""
+    about: Array
+    """what they were known to be about, shape (P,)"""
 
 
 @dataclass(frozen=True)
 class Solved:
     """The likeliest trajectory and clocks."""
 
-    nodes: Nodes
+    trajectory: Trajectory
     clocks: Mapping[str, Array]
     """the values of the terms"""
     covariance: Mapping[str, Array]
     """of the terms of each clock, as the noise figures have it"""
     misfit: float
-    """mean square of the measured values' residuals, each over its std"""
-    cost: float
+    """the least sum of squares over what it is with right noise figures"""
     converged: bool
 
 
@@ -148,7 +149,7 @@ class Trajectory:
     world: World
     imu: Inertial
     seen: Sequence[Sightings]
-    clocks: Mapping[str, Clock]
+    clocks: Mapping[str, ClockTerms]
     nodes: Nodes
     offsets: Mapping[str, Array] = field(default_factory=dict)
     """constant errors of sensors, by kind"""
@@ -180,13 +181,15 @@ class Trajectory:
         where = self._columns()
         of_clocks = {name: covariance[where[name], where[name]] for name in self.clocks}
         values = {name: clock.values for name, clock in self.clocks.items()}
-        squares, count = 0.0, 0
-        measured = self.imu.increments.preintegrated(self.nodes.errors[:-1])
-        for seen in self.seen:
-            part, _, predicted = self._predicted(seen, measured)
-            scaled = predicted.residual / part.std
-            squares, count = squares + float(np.sum(np.minimum(scaled**2, HUBER**2))), count + scaled.size
-        return Solved(self.nodes, values, of_clocks, squares / max(count, 1), normal.cost, converged)
+        # as many equations as unknowns, but for the values that were measured
+        expected = sum(seen.std.size for seen in self.seen)
+        return Solved(self, values, of_clocks, normal.cost / max(expected, 1), converged)
+
+    def shown(self, name: str) -> tuple[Array, Array]:
+        """Return a Gauss-Newton step of the terms of a clock, (P,), and its covariance, (P, P)."""
+        _, step, covariance = self._normal().solve(0.0)
+        where = self._columns()[name]
+        return step[where], covariance[where, where]
 
     def _columns(self) -> dict[str, slice]:
         """Return where the unknowns that are no node's stand: clocks, then constant errors."""
@@ -219,7 +222,7 @@ class Trajectory:
         for seen in self.seen:
             self._add_seen(normal, seen, measured)
         for name, clock in self.clocks.items():
-            _add_prior(normal, where[name], clock.values, clock.std)
+            _add_prior(normal, where[name], clock.values - clock.about, clock.std)
         for seen in self.seen:
             _add_prior(normal, where[seen.kind], self._offsets(seen), seen.offset_std)
         return normal

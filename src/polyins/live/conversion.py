@@ -6,18 +6,18 @@ import numpy as np
 
 from polyins.config import Config
 from polyins.live.source import RefusedError
-from polyins.model.rig import Rig
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.reading import sensor_stream
+from polyins.reading.imu_stream import increments_matrix
 from polyins.reading.position_stream import height_shift, on_plane
 
 
 class Conversion:
     """What a configuration says of mounts, clocks, heights and accuracies, applied to one sample at a time."""
 
-    def __init__(self, config: Config, rig: Rig, geodetic: bool) -> None:
-        self.rotations = {imu.name: _unless_identity(imu.rotation) for imu in rig.imus}
-        self.offsets = {entry.name: entry.clock_offset_s for entry in config.imus}
+    def __init__(self, config: Config, geodetic: bool) -> None:
+        self.matrices = {entry.name: _unless_identity(increments_matrix(entry)) for entry in config.imus}
+        self.clocks = {entry.name: entry.clock for entry in config.imus}
         self.gnss = config.gnss
         self.sensors = dict(sensor_stream.entries(config))
         self.geodetic = geodetic
@@ -29,12 +29,12 @@ class Conversion:
         return self._imu(sample) if isinstance(sample, ImuSample) else self._fix(sample)
 
     def _imu(self, sample: ImuSample) -> ImuSample:
-        if sample.imu not in self.rotations:
+        if sample.imu not in self.matrices:
             raise RefusedError("unknown IMU")
-        rotation, time = self.rotations[sample.imu], sample.time + self.offsets[sample.imu]
-        if rotation is None:
+        matrix, time = self.matrices[sample.imu], self.clocks[sample.imu].common(sample.time)
+        if matrix is None:
             return sample._replace(time=time)
-        return ImuSample(sample.imu, time, rotation @ sample.dtheta, rotation @ sample.dvel)
+        return ImuSample(sample.imu, time, matrix @ sample.dtheta, matrix @ sample.dvel)
 
     def _sensor(self, sample: SensorSample) -> SensorSample:
         entry = self.sensors.get(sample.kind)
@@ -44,7 +44,7 @@ class Conversion:
         std = sample.std
         if given is not None:
             std = sensor_stream.with_constraint(entry, np.array([given]))[0]
-        return sample._replace(time=sample.time + entry.clock_offset_s, std=std)
+        return sample._replace(time=entry.clock.common(sample.time), std=std)
 
     def _fix(self, fix: GnssFix) -> GnssFix:
         entry = self.gnss
@@ -53,7 +53,7 @@ class Conversion:
         std = fix.position_std if entry.position_std_m is None else np.array(entry.position_std_m)
         if std is None:
             raise RefusedError("GNSS without std")
-        time = fix.time + entry.clock_offset_s
+        time = entry.clock.common(fix.time)
         position = self._placed(self._above_ellipsoid(fix), fix.geodetic)
         has_velocity = fix.velocity is not None and fix.velocity_std is not None
         velocity = (fix.velocity, fix.velocity_std) if has_velocity else (None, None)
@@ -76,5 +76,5 @@ class Conversion:
         return position
 
 
-def _unless_identity(rotation: Array) -> Array | None:
-    return None if np.array_equal(rotation, np.eye(3)) else rotation
+def _unless_identity(matrix: Array) -> Array | None:
+    return None if np.array_equal(matrix, np.eye(3)) else matrix

@@ -280,7 +280,7 @@ def _session(options: Options, config: Config, recording: Recording, method: str
 
 def _sources(options: Options, config: Config, recording: Recording, session: Session) -> list[Opened]:
     names = tuple(imu.name for imu in recording.rig.imus)
-    conversion = Conversion(config, recording.rig, recording.geodetic)
+    conversion = Conversion(config, recording.geodetic)
     after = -math.inf
     if session.navigator is not None and session.navigator.state is not None:
         after = session.navigator.state.time - 2.0 * options.delay

@@ -86,9 +86,9 @@ def measured(rows: ImuRows, entry: ImuEntry, *, alone: bool, first_row: int = 0)
 
 def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
     """Return rows as increments in array axes, on a wheel in the module's, on the recording's clock."""
-    rotation = sensor_rotation(entry)
-    dtheta, dvel = _turned(rotation, rows.dtheta), _turned(rotation, rows.dvel)
-    return ImuStream(entry.name, rows.time + entry.clock_offset_s, dtheta, dvel)
+    matrix = increments_matrix(entry)
+    dtheta, dvel = _turned(matrix, rows.dtheta), _turned(matrix, rows.dvel)
+    return ImuStream(entry.name, entry.clock.common(rows.time), dtheta, dvel)
 
 
 def as_mounted(entry: ImuEntry) -> Imu:
@@ -150,6 +150,15 @@ def _within_range(rows: ImuRows, entry: ImuEntry) -> tuple[ImuRows, tuple[str, .
         f"{rows.source.path}: the gyro reaches its full scale, {limit:g} deg/s, in {count} row(s), the first at "
         f"{first:.3f} s; they are left out",
     )
+
+
+def increments_matrix(entry: ImuEntry) -> NDArray[np.float64]:
+    """Return what turns increments in sensor axes into those of the array over intervals of the common clock, (3, 3).
+
+    A gyro shows rates; what becomes of them over an interval by a clock that is slow is too little.
+    """
+    rotation, drift = sensor_rotation(entry), entry.clock.drift
+    return (1.0 + drift) * rotation if drift else rotation
 
 
 def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:

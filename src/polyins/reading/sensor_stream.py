@@ -75,7 +75,7 @@ def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tupl
     with document.at([kind, "file"]):
         find_named(entry.file)
     rows = _rows(kind, entry, document)
-    source, time = rows.source, rows.time + entry.clock_offset_s
+    source, time = rows.source, entry.clock.common(rows.time)
     if not len(time):
         raise InputError(f"{source.path}: no rows; expected those of {kind}")
     stream_checks.check_finite(source, {"time": time, kind: rows.value})
