@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -111,8 +111,10 @@ def imu_offsets(imus: Sequence[Imu], streams: Sequence[ImuStream], base: int) ->
     """
     hub = _hub(imus, base)
     signals = [_imu_signals(imu, stream) for imu, stream in zip(imus, streams, strict=True)]
+    bodies = [imu.wheel is None for imu in imus]
+    windows = [SHORT_WINDOW if body and bodies[hub] else WINDOW for body in bodies]
     to_hub = [
-        none(imu.name) if i == hub else find_offset(imu.name, signals[i], imus[hub].name, signals[hub])
+        none(imu.name) if i == hub else find_offset(imu.name, signals[i], imus[hub].name, signals[hub], windows[i])
         for i, imu in enumerate(imus)
     ]
     onward = reversed_offset(to_hub[base], imus[hub].name)
@@ -133,8 +135,19 @@ def gnss_offset(
         raise InputError(f"{name}: its clock's offset is found by wheel speed; expected an IMU on a wheel")
     rolling = Mean([_imu_signals(imus[i], streams[i]) for i in straight or wheels])
     position = displacement(gnss.position, gnss.position[0], geodetic)
-    path = Positions(gnss.time, position[:, :2])
-    return find_offset(name, path, "the wheels", rolling)
+    return find_offset(name, Positions(gnss.time, position[:, :2]), "the wheels", rolling)
+
+
+def body_offset(name: str, signals: Signals, imus: Sequence[Imu], streams: Sequence[ImuStream], window: float) -> Offset:
+    """Find what to add to the stamps of a heading, an attitude or a speed, by the rates or forces of a body.
+
+    Raises InputError without an IMU on a body, and as `imu_offsets`.
+    """
+    moved = [motion(stream) for imu, stream in zip(imus, streams, strict=True) if imu.wheel is None]
+    if not moved:
+        raise InputError(f"{name}: its clock's offset is found by an IMU on the body; expected one")
+    felt = moved[0].force if name == "odometer" else moved[0].rate
+    return find_offset(name, signals, "the IMUs", moved[0].running(felt), window)
 
 
 def find_offset(name: str, signals: Signals, base_name: str, base: Signals, window: float = WINDOW) -> Offset:
@@ -145,12 +158,11 @@ def find_offset(name: str, signals: Signals, base_name: str, base: Signals, wind
     out an eighth of the time each. Raises InputError for no common motion and for an ambiguous offset.
     """
     pair = f"{name} and {base_name}"
-    coarse = search(signals, base, pair, window)
-    for _ in range(3):
-        offset, correlation, at_edge = _refine(signals, base, coarse, window)
-        if not at_edge:
-            break
-        coarse = offset
+    found = [_refined(signals, base, coarse, window) for coarse in candidates(signals, base, pair, window)]
+    offset, gain, correlation = found[0]
+    for rival in found[1:]:
+        if rival.gain > RIVAL * gain:
+            raise ambiguous(pair, offset, rival.offset)
     if correlation < LEAST_CORRELATION:
         raise InputError(
             f"time_offset: {pair} share no common motion (correlation {correlation:.2f} at best); expected streams of "
@@ -188,11 +200,12 @@ def chained(one: Offset, onward: Offset) -> Offset:
     std = float(np.linalg.norm([one.std_s, one.drift_std * apart, onward.std_s, onward.drift_std * away]))
     sure = [sure for *_, sure in (*one.leaps, *onward.leaps)]
     known = [value for value in (one.correlation, onward.correlation) if value is not None]
+    correlation = min(known) if len(known) == 2 else None
     return Offset(
         one.name,
         clock.offset,
         std,
-        min(known) if known else None,
+        correlation,
         clock.drift,
         float(np.hypot(one.drift_std, onward.drift_std)),
         clock.reference,
@@ -224,8 +237,26 @@ def _windows(signals: Signals, step: float, window: float) -> tuple[Array, Array
     return middle, signals.between(middle - 0.5 * window, middle + 0.5 * window)
 
 
-def search(signals: Signals, base: Signals, pair: str, window: float = WINDOW) -> float:
-    """Return the offset with the most information, to a step of the grid; raise InputError if there are rivals."""
+class _Refined(NamedTuple):
+    """An offset near which two streams fit best."""
+
+    offset: float
+    """s"""
+    gain: float
+    """information times windows in common"""
+    correlation: float
+
+
+def ambiguous(pair: str, one: float, other: float) -> InputError:
+    """Return the error that two offsets, s, fit almost equally well."""
+    return InputError(
+        f"time_offset: ambiguous offset of {pair}: {one:.2f} s and {other:.2f} s fit almost equally well; expected a "
+        "drive whose speed or turns do not repeat, or none in common"
+    )
+
+
+def candidates(signals: Signals, base: Signals, pair: str, window: float = WINDOW) -> list[float]:
+    """Return the offset with the most information, to a step of the grid, and the best of its rivals, if there are."""
     time, one = _windows(signals, COARSE_STEP, window)
     base_time, two = _windows(base, COARSE_STEP, window)
     shortest = SHORTEST_COMMON * window
@@ -241,12 +272,8 @@ def search(signals: Signals, base: Signals, pair: str, window: float = WINDOW) -
     rivals = peaks[np.abs(lags[peaks] - lags[best]) * COARSE_STEP > LOBE]
     offset = base_time[0] - time[0] + lags * COARSE_STEP
     if len(rivals) and gain[rivals].max() > RIVAL * gain[best]:
-        other = offset[rivals[np.argmax(gain[rivals])]]
-        raise InputError(
-            f"time_offset: ambiguous offset of {pair}: {offset[best]:.2f} s and {other:.2f} s fit almost equally well; "
-            "expected a drive whose speed or turns do not repeat, or none in common"
-        )
-    return float(offset[best])
+        return [float(offset[best]), float(offset[rivals[np.argmax(gain[rivals])]])]
+    return [float(offset[best])]
 
 
 def _gains(one: Array, two: Array, least: float) -> tuple[Array, Array]:
@@ -298,24 +325,24 @@ def _information(aa: Array, bb: Array, ab: Array, noise: float) -> Array:
     return np.asarray(-0.5 * np.log(np.maximum(np.linalg.det(left), np.finfo(float).tiny)))
 
 
-def _refine(signals: Signals, base: Signals, coarse: float, window: float) -> tuple[float, float, bool]:
-    """Return the offset with the most information near `coarse`, the correlation, and if it lies at an edge.
-
-    Windows that do not fit count less (Huber).
-    """
+def _refined(signals: Signals, base: Signals, coarse: float, window: float) -> _Refined:
+    """Return the offset with the most information near `coarse`; windows that do not fit count less (Huber)."""
     begin, end = signals.span
     first, last = base.span
     half = 0.5 * window
     reach = half + FINE_REACH + COARSE_STEP
-    middle = np.arange(max(begin, first - coarse) + reach, min(end, last - coarse) - reach, FINE_STEP)
-    windows = (middle - half, middle + half)
-    one = _standard(signals.between(*windows))
-    weights = _weights(one, base.between(windows[0] + coarse, windows[1] + coarse))
-    trials = coarse + np.linspace(-FINE_REACH, FINE_REACH, FINE_TRIALS)
-    gains = np.array([_gain(one, _standard(base.between(*(w + t for w in windows))), weights) for t in trials])
-    peak = _peak(trials, gains)
-    correlation = float(np.sqrt(-np.expm1(-2.0 * gains.max())))
-    return peak, correlation, bool(abs(peak - coarse) > 0.9 * FINE_REACH)
+    for _ in range(3):
+        middle = np.arange(max(begin, first - coarse) + reach, min(end, last - coarse) - reach, FINE_STEP)
+        windows = (middle - half, middle + half)
+        one = _standard(signals.between(*windows))
+        weights = _weights(one, base.between(windows[0] + coarse, windows[1] + coarse))
+        trials = coarse + np.linspace(-FINE_REACH, FINE_REACH, FINE_TRIALS)
+        gains = np.array([_gain(one, _standard(base.between(*(w + t for w in windows))), weights) for t in trials])
+        peak, before = _peak(trials, gains), coarse
+        coarse = peak
+        if abs(peak - before) <= 0.9 * FINE_REACH:
+            break
+    return _Refined(peak, len(middle) * float(gains.max()), float(np.sqrt(-np.expm1(-2.0 * gains.max()))))
 
 
 def _weights(one: Array, two: Array) -> Array:

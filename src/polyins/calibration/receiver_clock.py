@@ -11,7 +11,7 @@ from polyins.calibration.first_trajectory import Jerks, first_nodes
 from polyins.calibration.preintegration import Increments
 from polyins.calibration.sightings import Sightings
 from polyins.calibration.leaps import MOST, Parts
-from polyins.calibration.offsets import search
+from polyins.calibration.offsets import ambiguous, candidates
 from polyins.calibration.trajectory import ClockTerms, Inertial, Solved, Trajectory, World
 from polyins.errors import InputError
 from polyins.model.geodesy import displacement
@@ -26,6 +26,8 @@ MARGIN = 2.0
 OFFSET_STD, DRIFT_STD = 10.0, 500.0 * PPM
 """s and relative: what is known of clocks beforehand"""
 ROUNDS = 3
+WORSE = 2.0
+"""times the misfit of the best offset, from which another one is none"""
 PART_S, LEAST_FIXES, MOST_PARTS = 5.0, 4, 60
 """s, fixes: what one part of a recording is at least, in which a leap is looked for; and how many at most"""
 
@@ -127,9 +129,15 @@ def receiver_offset(body: Body, path: Path) -> Offset:
     """
     gnss = path.gnss
     jerks = Jerks(gnss.time, path.position)
-    coarse = search(jerks, body.jerks, f"{path.name} and the IMUs")
+    pair = f"{path.name} and the IMUs"
     terms = Terms(float(np.round(np.mean(gnss.time[[0, -1]]))))
-    solved = solve(body, path, terms, np.array([coarse, 0.0]))
+    first = [np.array([coarse, 0.0]) for coarse in candidates(jerks, body.jerks, pair)]
+    solved, *others = sorted((solve(body, path, terms, values) for values in first), key=lambda one: one.misfit)
+    if not np.isfinite(solved.misfit):
+        raise InputError(f"time_offset: {path.name}: its motion does not fit that of the IMUs at any offset")
+    for other in others:
+        if other.misfit < WORSE * solved.misfit:
+            raise ambiguous(pair, solved.clocks[path.name][0], other.clocks[path.name][0])
     for _ in range(MOST):
         leap = _leap(solved, path, terms)
         if leap is None:
@@ -147,7 +155,7 @@ def receiver_offset(body: Body, path: Path) -> Offset:
 def solve(body: Body, path: Path, terms: Terms, values: Array) -> Solved:
     """Return the likeliest trajectory and clock, from first values of its terms, which must be right to half a second.
 
-    Raises InputError where least squares do not converge.
+    The misfit is infinite where least squares do not converge.
     """
     gnss, begin = path.gnss, values
     for _ in range(ROUNDS):
@@ -163,7 +171,7 @@ def solve(body: Body, path: Path, terms: Terms, values: Array) -> Solved:
         moved, begin = abs(found[0] - begin[0]), found
         if solved.converged and moved < 0.5 * MARGIN:
             return solved
-    raise InputError(f"time_offset: {path.name}: its motion does not fit that of the IMUs at any offset nearby")
+    return replace(solved, misfit=np.inf)
 
 
 def node_length(time: Array, fixes: Array) -> int:

@@ -114,19 +114,22 @@ def build(config: Config, document: Document, wheels_known: bool = True) -> Reco
     measuring = [found[i] for i in alive]
     faults.check_distinct([one.stream for one in measuring])
     kept, fallen = usable.upright([one.entry for one in measuring], alive, [one.stream for one in measuring], document)
-    known, config = config, config.model_copy(update={"imus": tuple(measuring[i].entry for i in kept)})
-    imus, streams = tuple(measuring[i].imu for i in kept), tuple(measuring[i].stream for i in kept)
-    config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
-    notes += [clocks.described(offset) for offset in offsets]
+    going = [measuring[i] for i in kept]
+    imus = tuple(one.imu for one in going)
+    known, config = config, config.model_copy(update={"imus": tuple(one.entry for one in going)})
+    config, streams, offsets = clocks.on_one_clock(config, document, going)
+    known = _with_clocks(known, config)
     kept, apart = usable.overlapping(config.imus, [(stream.time[0], stream.time[-1]) for stream in streams])
     config = config.model_copy(update={"imus": tuple(config.imus[i] for i in kept)})
     imus, streams = tuple(imus[i] for i in kept), tuple(streams[i] for i in kept)
     findings = (*dead, *fallen, *apart, *(finding for one in measuring for finding in one.findings))
+    findings += tuple(clocks.described(one, float(streams[0].time[0])) for one in offsets)
+    findings += tuple(finding for one in offsets for finding in clocks.leaps_of(one))
     spans = {stream.name: (stream.time[0], stream.time[-1]) for stream in streams}
     span = stream_checks.check_common_span(spans, wait=any(imu.wheel for imu in imus))
     recording = assemble(config, document, imus, streams, span, wheels_known)
     warnings = (*notes, *recording.warnings)
-    text = in_force(known.model_copy(update={"gnss": config.gnss}), offsets)
+    text = in_force(known)
     return replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
 
 
@@ -233,18 +236,16 @@ def _rig(config: Config, document: Document, imus: tuple[Imu, ...]) -> Rig:
     return rig
 
 
-def in_force(config: Config, offsets: tuple[Offset, ...] = ()) -> str:
-    """Return the configuration as YAML, with the clock offsets that were found in the place of those to be found."""
-    found = {offset.name: offset.offset_s for offset in offsets}
-    imus = tuple(
-        imu.model_copy(update={"clock_offset_s": imu.clock_offset_s + found.get(imu.name, 0.0), "time_offset": None})
-        if imu.time_offset
-        else imu
-        for imu in config.imus
-    )
-    gnss = config.gnss and config.gnss.model_copy(update={"time_offset": None})
-    known = config.model_copy(update={"imus": imus, "gnss": gnss})
-    return write_yaml(known.model_dump(mode="json", exclude=NOT_IN_FORCE))
+def in_force(config: Config) -> str:
+    """Return the configuration as YAML."""
+    return write_yaml(config.model_dump(mode="json", exclude=NOT_IN_FORCE))
+
+
+def _with_clocks(config: Config, found: Config) -> Config:
+    """Return a configuration with what was found of the clocks; IMUs that are left out have none."""
+    by_name = {entry.name: entry for entry in found.imus}
+    imus = tuple(by_name.get(entry.name, entry.model_copy(update=entry.settled())) for entry in config.imus)
+    return found.model_copy(update={"imus": imus})
 
 
 def one_by_kind(notes: list[str]) -> list[str]:
