@@ -11,6 +11,8 @@ from polyins.calibration.sightings import Nodes
 from polyins.calibration.trajectory import World
 from polyins.model.recording import Array
 
+WAY_S = 1.0
+"""s of the way that tells a velocity"""
 MEMORY = 20.0
 """s: how long gyros hold a direction before their biases are known"""
 STEP = 2.0
@@ -68,13 +70,16 @@ def first_nodes(increments: Increments, time: Array, position: Array, velocity: 
     that between fixes (Wahba's problem), those nearby counting most.
     """
     nodes = increments.nodes
+
+    def at(when: Array, values: Array) -> Array:
+        return np.column_stack([np.interp(when, time, column) for column in values.T])
+
+    place = at(nodes, position)
     if velocity is None:
-        velocity = np.gradient(position, time, axis=0)
-
-    def at_nodes(values: Array) -> Array:
-        return np.column_stack([np.interp(nodes, time, column) for column in values.T])
-
-    place, speed = at_nodes(position), at_nodes(velocity)
+        half = max(0.5 * WAY_S, float(np.median(np.diff(time))))
+        speed = (at(nodes + half, position) - at(nodes - half, position)) / (2.0 * half)
+    else:
+        speed = at(nodes, velocity)
     gravity = world.pull(place)
     span = np.diff(nodes)
     measured = increments.preintegrated(np.zeros((len(span), 12)))

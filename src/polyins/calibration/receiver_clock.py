@@ -25,6 +25,8 @@ MARGIN = 2.0
 """s before the first fix and after the last that the trajectory goes on"""
 OFFSET_STD, DRIFT_STD = 10.0, 500.0 * PPM
 """s and relative: what is known of clocks beforehand"""
+JERK_WINDOW = 0.5
+"""s from one jerk to one that differs"""
 ROUNDS = 3
 WORSE = 2.0
 """times the misfit of the best offset, from which another one is none"""
@@ -131,7 +133,7 @@ def receiver_offset(body: Body, path: Path) -> Offset:
     jerks = Jerks(gnss.time, path.position)
     pair = f"{path.name} and the IMUs"
     terms = Terms(float(np.round(np.mean(gnss.time[[0, -1]]))))
-    first = [np.array([coarse, 0.0]) for coarse in candidates(jerks, body.jerks, pair)]
+    first = [np.array([coarse, 0.0]) for coarse in candidates(jerks, body.jerks, pair, JERK_WINDOW)]
     solved, *others = sorted((solve(body, path, terms, values) for values in first), key=lambda one: one.misfit)
     if not np.isfinite(solved.misfit):
         raise InputError(f"time_offset: {path.name}: its motion does not fit that of the IMUs at any offset")

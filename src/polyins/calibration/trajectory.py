@@ -19,7 +19,7 @@ from polyins.calibration.sightings import POSITION, SLOW, STATES, TURN, VELOCITY
 from polyins.model.recording import Array
 from polyins.model.rig import NoiseGrade
 
-ROUNDS = 25
+ROUNDS = 60
 STILL = 1e-3
 """of its std: clocks that move less have converged"""
 HUBER = 3.0
@@ -156,7 +156,7 @@ class Trajectory:
 
     def solve(self) -> Solved:
         """Return the least-squares solution, by damped Gauss-Newton steps."""
-        problem, damping = self, 1e-4
+        problem, damping, eases = self, 1e-4, 0.1
         normal = problem._normal()
         for _ in range(ROUNDS):
             nodes, step, covariance = normal.solve(damping)
@@ -166,10 +166,10 @@ class Trajectory:
             if not after.cost < normal.cost * (1.0 + 1e-9):
                 if damping > 1e6:
                     break
-                damping *= 10.0
+                damping, eases = 10.0 * damping, 1.0
                 continue
             done = bool(np.all(np.abs(step) <= STILL * np.sqrt(np.diag(covariance)))) and damping < 1e-2
-            problem, normal, damping = trial, after, max(0.1 * damping, 1e-9)
+            problem, normal, damping, eases = trial, after, max(eases * damping, 1e-9), 0.1
             if done:
                 break
         else:

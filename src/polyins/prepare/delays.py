@@ -8,7 +8,7 @@ turned meanwhile. Neither needs a filter, which would take part of a delay for e
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,8 @@ FARTHEST_FIXES = 25.0
 """s: delays of fixes that are looked for; leap seconds are 18"""
 ROUGH, STEP = 0.5, 0.1
 """s, of the search: everywhere, and near what it finds"""
+WAY_S = 1.0
+"""s of the ways whose courses tell a drift"""
 SIGMAS = 4.0
 """robust standard deviations, from which a turn is left out of a trend"""
 SURE_OF_FIXES = 4.0
@@ -213,7 +215,7 @@ def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Find
     found = list(_told(blocks.time, yaw, parts))
     # what no part is sure of all of them may be
     off = _late(found) or _late(list(_told(blocks.time, yaw, [turns])))
-    trend = _trend(blocks.time, yaw, turns, _typical(off or found)) if len(found) > 1 else None
+    trend = _surest_trend(blocks.time, yaw, gnss, geodetic, _typical(off or found)) if len(found) > 1 else None
     if not off and trend is not None:
         off = found
     if not off:
@@ -226,7 +228,7 @@ def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Find
         more, keys = _drifting(trend, size)
         raise InputError(
             f"GNSS: its course turns as the gyros do, {abs(size):.1f} s {late} all along{more}; expected one clock:"
-            f" gnss.clock_offset_s: {-size:.1f}{keys} corrects that, or gnss.time_offset: estimate"
+            f" gnss.clock_offset_s: {-size:.{1 if trend is None else 3}f}{keys} corrects that, or gnss.time_offset: estimate"
         )
     std = float(np.median(gnss.position_std[:, :2]))
     largest = max(abs(size), *map(abs, expected)) if trend is not None else abs(size)
@@ -250,8 +252,27 @@ class _Trend:
         return self.delay + self.drift * (time - self.middle)
 
 
-def _trend(time: Array, yaw: Array, turns: _Turns, delay: float) -> _Trend | None:
-    """Return by how much a delay grows, if it surely does; from what it is on the whole, s.
+def _surest_trend(time: Array, yaw: Array, gnss: GnssStream, geodetic: bool, delay: float) -> _Trend | None:
+    """Return by how much a delay grows, if it surely does, by velocities or by ways of a second, which is surer.
+
+    `delay`: on the whole, s. A way has the mean course of its time, so the gyros' yaw is averaged likewise.
+    """
+    every = max(1, round(WAY_S / float(np.median(np.diff(gnss.time)))))
+    ways = replace(gnss.at(slice(None, None, every)), velocity=None, velocity_std=None)
+    half = 0.5 * float(np.median(np.diff(ways.time)))
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (yaw[1:] + yaw[:-1]) * np.diff(time))])
+    mean = (np.interp(time + half, time, area) - np.interp(time - half, time, area)) / (2.0 * half)
+    kinds = [(mean, ways)] + ([] if gnss.velocity is None else [(yaw, gnss)])
+    turned = [(about, _turns(fixes, geodetic)) for about, fixes in kinds]
+    found = [_trend(time, about, turns, delay) for about, turns in turned if len(turns.begin) >= LEAST_TURNS]
+    surest = min(found, key=lambda one: one.drift_std, default=None)
+    if surest is None or abs(surest.drift) < SURE_OF_FIXES * surest.drift_std:
+        return None
+    return surest if abs(surest.drift) * (gnss.time[-1] - gnss.time[0]) > LEAST_FIX_DELAY else None
+
+
+def _trend(time: Array, yaw: Array, turns: _Turns, delay: float) -> _Trend:
+    """Return by how much a delay grows, from what it is on the whole, s.
 
     What is not known of the place of the antenna is the same all along and spoils no drift.
     """
@@ -272,9 +293,7 @@ def _trend(time: Array, yaw: Array, turns: _Turns, delay: float) -> _Trend | Non
         solved = np.linalg.solve(normal, design[used].T @ left[used])
         delay, drift = delay + float(solved[0]), drift + float(solved[1])
     std = float(np.sqrt(variance * np.linalg.inv(normal)[1, 1]))
-    grows = abs(drift) * (turns.end[-1] - turns.begin[0])
-    sure = abs(drift) > SURE_OF_FIXES * std and grows > LEAST_FIX_DELAY
-    return _Trend(middle, delay, drift, std) if sure else None
+    return _Trend(middle, delay, drift, std)
 
 
 def _drifting(trend: _Trend | None, size: float) -> tuple[str, str]:
