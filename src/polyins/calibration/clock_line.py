@@ -15,6 +15,7 @@ from polyins.calibration.leaps import MOST, Parts
 from polyins.calibration.regression import blocks, fit, huber
 from polyins.model.clock import Clock
 from polyins.model.recording import Array
+from polyins.model.rig import PPM
 
 if TYPE_CHECKING:
     from polyins.calibration.offsets import Signals
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 NEAR = 60.0
 """s to both sides of the middle, in which a drift does not spoil what is linear; from there it is followed outwards"""
 ROUNDS = 4
-LEAST_ROWS = 24
+DRIFT_STD = 500.0 * PPM
+"""relative: what is known of a drift beforehand; crystals have 20 to 100 ppm"""
 PART_WINDOWS = 20
 """windows in a part in which a leap is looked for"""
 MOST_PARTS = 60
@@ -33,8 +35,18 @@ class Line:
     """A clock, and how sure its offset, drift and leaps are."""
 
     clock: Clock
-    std: Array
-    """s, relative, s ...; shape (2 + L,)"""
+    covariance: Array
+    """of offset, drift and leaps; s, relative, s ...; shape (2 + L, 2 + L)"""
+
+    def plausible(self) -> Line:
+        """Return it with what is known of any clock's drift beforehand."""
+        clock, shared = self.clock, self.covariance[:, 1]
+        gain = shared / (shared[1] + DRIFT_STD**2)
+        offset, drift, *leaps = (np.array([clock.offset, clock.drift, *(size for _, size in clock.leaps)])
+                                 - gain * clock.drift).tolist()  # fmt: skip
+        sizes = tuple((at, size) for (at, _), size in zip(clock.leaps, leaps, strict=True))
+        covariance = self.covariance - np.outer(gain, shared)
+        return Line(Clock(offset, drift, clock.reference, sizes), covariance)
 
 
 @dataclass(frozen=True)
@@ -52,7 +64,7 @@ class Pair:
         first, last = (edge - offset for edge in self.base.span)
         begin, end = max(begin, first), min(end, last)
         reference = float(np.round(0.5 * (begin + end)))
-        line = Line(Clock(offset, 0.0, reference), np.zeros(2))
+        line = Line(Clock(offset, 0.0, reference), np.zeros((2, 2)))
         reach, half = NEAR, 0.5 * (end - begin)
         while True:
             middle = self._middles(line.clock, reach)
@@ -70,7 +82,7 @@ class Pair:
             for _ in range(2 * ROUNDS):
                 line = self._step(clock, self._middles(clock, reach))
                 clock = line.clock
-        return line
+        return line.plausible()
 
     def _middles(self, clock: Clock, reach: float) -> Array:
         """Return middles of windows that both cover and in which the clock does not leap, s."""
@@ -115,8 +127,10 @@ class Pair:
         rows = (slope[:, :, None] * terms[:, None, :]).reshape(count * width, -1)
         found = fit(rows, residual.ravel(), np.repeat(blocks(count), width), np.repeat(weights, width))
         offset, drift = clock.offset + found.values[0], clock.drift + found.values[1]
-        sizes = tuple((at, size + more) for (at, size), more in zip(clock.leaps, found.values[2:].tolist(), strict=True))
-        return Line(Clock(float(offset), float(drift), clock.reference, sizes), found.std)
+        sizes = tuple(
+            (at, size + more) for (at, size), more in zip(clock.leaps, found.values[2:].tolist(), strict=True)
+        )
+        return Line(Clock(float(offset), float(drift), clock.reference, sizes), found.covariance)
 
     def _leap(self, clock: Clock) -> float | None:
         """Return the stamp of a leap that the clock does not have, s."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polyins.model.recording import Array
 
@@ -52,6 +54,6 @@ class Parts:
         return float(self.begins[known][best + 1]) if gains[best] > SURE**2 else None
 
 
-def _left(design: Array, observed: Array) -> Array:
+def _left(design: Array, observed: NDArray[np.floating[Any]]) -> Array:
     """Return what a design leaves of the observed."""
     return np.asarray(observed - design @ np.linalg.lstsq(design, observed, rcond=None)[0])

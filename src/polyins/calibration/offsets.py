@@ -138,7 +138,9 @@ def gnss_offset(
     return find_offset(name, Positions(gnss.time, position[:, :2]), "the wheels", rolling)
 
 
-def body_offset(name: str, signals: Signals, imus: Sequence[Imu], streams: Sequence[ImuStream], window: float) -> Offset:
+def body_offset(
+    name: str, signals: Signals, imus: Sequence[Imu], streams: Sequence[ImuStream], window: float
+) -> Offset:
     """Find what to add to the stamps of a heading, an attitude or a speed, by the rates or forces of a body.
 
     Raises InputError without an IMU on a body, and as `imu_offsets`.
@@ -169,7 +171,7 @@ def find_offset(name: str, signals: Signals, base_name: str, base: Signals, wind
             "one drive"
         )
     line = Pair(signals, base, window).line(offset)
-    clock, std = line.clock, line.std.tolist()
+    clock, std = line.clock, np.sqrt(np.diag(line.covariance)).tolist()
     leaps = tuple((at, size, sure) for (at, size), sure in zip(clock.leaps, std[2:], strict=True))
     return Offset(name, clock.offset, std[0], correlation, clock.drift, std[1], clock.reference, leaps)
 
@@ -217,9 +219,7 @@ def reversed_offset(one: Offset, name: str) -> Offset:
     """Return what to add to the other clock instead, whose stream has that name."""
     clock = one.clock.inverse
     leaps = tuple((*leap, std) for leap, (*_, std) in zip(clock.leaps, one.leaps, strict=True))
-    return replace(
-        one, name=name, offset_s=clock.offset, drift=clock.drift, reference_s=clock.reference, leaps=leaps
-    )
+    return replace(one, name=name, offset_s=clock.offset, drift=clock.drift, reference_s=clock.reference, leaps=leaps)
 
 
 def _imu_signals(imu: Imu, stream: ImuStream) -> RunningSums:

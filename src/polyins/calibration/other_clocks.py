@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from polyins.calibration.motion import RunningSums
 from polyins.calibration.offsets import ATTITUDE_WINDOW, WINDOW, body_offset, find_offset, gnss_offset
-from polyins.calibration.receiver_clock import Body, Path, receiver_offset
+from polyins.calibration.receiver_clock import Body, Path, Problem, receiver_offset
+from polyins.calibration.sightings import Sightings
 from polyins.errors import InputError
 from polyins.model.recording import AidingStream, Array, GnssStream, ImuStream, Offset, Reference
 from polyins.model.rig import Imu
 
 LEAST_SPEED, LEAST_CLIMB = 0.05, 0.05
 """m/s and m, rms over a window: less is no motion"""
+SEEN_AS = {"heading": "heading", "odometer": "speed"}
 UNKNOWN_STD = 0.05
 """m, of positions of a reference, which states none"""
 
@@ -60,11 +62,15 @@ class Movers:
         return any(imu.wheel is not None for imu in self.imus)
 
     def of_positions(self, name: str, gnss: GnssStream, geodetic: bool, antenna: Array) -> Offset:
-        """Find what brings positions to the clock of the IMUs: by the spin of wheels, or by a trajectory of the body."""
+        """Find what brings positions to the clock of the IMUs: by the spin of wheels, or by the body's trajectory."""
         if self.wheeled:
             return gnss_offset(self.imus, self.streams, gnss, geodetic, name)
         body = Body.of(self.imus, self.streams)
         return receiver_offset(body, Path.of(name, gnss, geodetic, self.gravity, antenna - body.place))
+
+    def path(self, gnss: GnssStream, geodetic: bool, antenna: Array) -> Path:
+        """Return what a receiver says whose clock is known."""
+        return Path.of("GNSS", gnss, geodetic, self.gravity, antenna)
 
     def of_reference(self, reference: Reference, geodetic: bool) -> Offset:
         """Find what brings a reference to the clock of the IMUs: by its attitude, or else by its positions."""
@@ -75,8 +81,22 @@ class Movers:
         gnss = GnssStream(reference.time, reference.position, std)
         return self.of_positions("reference", gnss, geodetic, reference.lever_arm)
 
-    def of_sensor(self, stream: AidingStream, gnss: GnssStream | None) -> Offset:
-        """Find what brings headings and speeds to the clock of the IMUs, heights to that of GNSS."""
+    def of_sensor(self, stream: AidingStream, arm: Array, path: Path | None) -> Offset:
+        """Find what brings headings, speeds and heights to the clock of the IMUs.
+
+        Where there is a receiver, whose clock is known, headings and speeds by the trajectory that it and a body give,
+        and heights by its own; else headings by the body's rates and speeds by its forces. `arm`: to what measures, m.
+        """
+        at_first = self._at_first(stream, None if path is None else path.gnss)
+        if path is None or self.wheeled or stream.kind not in SEEN_AS:
+            return at_first
+        body = Body.of(self.imus, self.streams)
+        path, arm = replace(path, arm=path.arm - body.place), arm - body.place
+        values, std = stream.value[:, None], stream.std[:, :1]
+        seen = Sightings(stream.kind, SEEN_AS[stream.kind], stream.time, values, std, arm)
+        return Problem(body, path, (*path.seen, seen), stream.kind).offset([at_first.offset_s])
+
+    def _at_first(self, stream: AidingStream, gnss: GnssStream | None) -> Offset:
         if stream.kind == "heading":
             shown = RunningSums(stream.time, np.unwrap(stream.value)[:, None])
             return body_offset(stream.kind, shown, self.imus, self.streams, WINDOW)

@@ -121,14 +121,15 @@ class Preintegrated:
         middle = true_dvel + 0.5 * np.cross(true_dtheta, true_dvel)
         gain = np.einsum("kab,kb->ka", turned, middle)
         gain_by = -turned @ cross(middle) @ self.turned_by[:, j]
-        gain_by[:, :, ACCEL] -= turned @ by_accel
+        gain_by[:, :, ACCEL] -= turned @ (np.eye(3) + 0.5 * cross(true_dtheta)) @ by_accel
+        gain_by[:, :, GYRO] += 0.5 * turned @ cross(true_dvel) @ by_gyro
         self.turned[:, j + 1] = turned @ change
         self.position[:, j + 1] = self.position[:, j] + h * (self.velocity[:, j] + 0.5 * gain)
         self.velocity[:, j + 1] = self.velocity[:, j] + gain
         self.position_by[:, j + 1] = self.position_by[:, j] + h[:, :, None] * (self.velocity_by[:, j] + 0.5 * gain_by)
         self.velocity_by[:, j + 1] = self.velocity_by[:, j] + gain_by
         self.turned_by[:, j + 1] = change.mT @ self.turned_by[:, j]
-        self.turned_by[:, j + 1][:, :, GYRO] -= by_gyro
+        self.turned_by[:, j + 1][:, :, GYRO] -= (np.eye(3) - 0.5 * cross(true_dtheta)) @ by_gyro
         self.rate[:, j], self.force[:, j] = true_dtheta / h, true_dvel / h
         self.rate[:, j + 1], self.force[:, j + 1] = self.rate[:, j], self.force[:, j]
 

@@ -7,24 +7,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from polyins.calibration.clock_line import DRIFT_STD
 from polyins.calibration.first_trajectory import Jerks, first_nodes
-from polyins.calibration.preintegration import Increments
-from polyins.calibration.sightings import Sightings
 from polyins.calibration.leaps import MOST, Parts
 from polyins.calibration.offsets import ambiguous, candidates
+from polyins.calibration.preintegration import Increments
+from polyins.calibration.sightings import Sightings
 from polyins.calibration.trajectory import ClockTerms, Inertial, Solved, Trajectory, World
 from polyins.errors import InputError
 from polyins.model.geodesy import displacement
 from polyins.model.recording import Array, GnssStream, ImuStream, Offset
-from polyins.model.rig import PPM, Imu, NoiseGrade
+from polyins.model.rig import Imu, NoiseGrade
 from polyins.prepare.timesync import align
 
 LONGEST_NODE = 1.0
 """s from one node of the trajectory to the next"""
 MARGIN = 2.0
 """s before the first fix and after the last that the trajectory goes on"""
-OFFSET_STD, DRIFT_STD = 10.0, 500.0 * PPM
-"""s and relative: what is known of clocks beforehand"""
+OFFSET_STD = 10.0
+"""s: what is known of an offset that is found at first sight"""
 JERK_WINDOW = 0.5
 """s from one jerk to one that differs"""
 ROUNDS = 3
@@ -124,87 +125,106 @@ class Terms:
         return np.array([OFFSET_STD, DRIFT_STD, *[OFFSET_STD] * len(self.leaps)])
 
 
+@dataclass(frozen=True)
+class Problem:
+    """A trajectory, and the one clock that is not known."""
+
+    body: Body
+    path: Path
+    seen: Sequence[Sightings]
+    """the fixes, and what else is measured"""
+    name: str
+    """of the stream whose clock is to be found"""
+
+    @property
+    def stamps(self) -> Array:
+        """Those of that stream, s."""
+        return next(one.stamps for one in self.seen if one.stream == self.name)
+
+    def offset(self, first: Sequence[float]) -> Offset:
+        """Find what to add to the stamps, from what may be right to half a second, s.
+
+        Raises InputError where least squares do not converge, and where several offsets fit.
+        """
+        pair = f"{self.name} and the IMUs"
+        terms = Terms(float(np.round(np.mean(self.stamps[[0, -1]]))))
+        starts = [np.array([coarse, 0.0]) for coarse in first]
+        solved, *others = sorted((self.solve(terms, values) for values in starts), key=lambda one: one.misfit)
+        for other in others:
+            if other.misfit < min(WORSE * solved.misfit, np.inf):
+                raise ambiguous(pair, solved.clocks[self.name][0], other.clocks[self.name][0])
+        for _ in range(MOST):
+            leap = self._leap(solved, terms)
+            if leap is None:
+                break
+            terms = replace(terms, leaps=tuple(sorted((*terms.leaps, leap))))
+            solved = self.solve(terms, np.array([*solved.clocks[self.name][:2], *[0.0] * len(terms.leaps)]))
+        if not np.isfinite(solved.misfit):
+            raise InputError(f"time_offset: the motions of {pair} do not fit at any offset; expected one drive")
+        values = solved.clocks[self.name].tolist()
+        std = np.sqrt(np.diag(solved.covariance[self.name]) * max(1.0, solved.misfit)).tolist()
+        leaps = tuple(zip(terms.leaps, values[2:], std[2:], strict=True))
+        return Offset(self.name, values[0], std[0], None, values[1], std[1], terms.reference, leaps)
+
+    def solve(self, terms: Terms, values: Array) -> Solved:
+        """Return the likeliest trajectory and clock; the misfit is infinite where least squares do not converge."""
+        gnss, begin = self.path.gnss, values
+        for _ in range(ROUNDS):
+            time = gnss.time + (terms.columns(gnss.time) @ begin if self.name == self.path.name else 0.0)
+            own, increments = self.body.within(float(time[0]) - MARGIN, float(time[-1]) + MARGIN)
+            cut = Increments.of(own, increments, node_length(own, gnss.time))
+            nodes = first_nodes(cut, time, self.path.position, gnss.velocity, self.path.world)
+            columns = {one.key: terms.columns(one.stamps) for one in self.seen}
+            clocks = {self.name: ClockTerms(columns, begin, terms.std, values)}
+            inertial = Inertial(cut, self.body.noise, self.body.start_std)
+            solved = Trajectory(self.path.world, inertial, self.seen, clocks, nodes).solve()
+            found = solved.clocks[self.name]
+            moved, begin = abs(found[0] - begin[0]), found
+            if not solved.converged:
+                break
+            if moved < 0.5 * MARGIN:
+                return solved
+        return replace(solved, misfit=np.inf)
+
+    def _leap(self, solved: Solved, terms: Terms) -> float | None:
+        """Return the first stamp after a leap that the terms do not have, s."""
+        stamps = self.stamps
+        usual = float(np.median(np.diff(stamps)))
+        length = max(PART_S, LEAST_FIXES * usual, (stamps[-1] - stamps[0]) / MOST_PARTS)
+        edges = np.arange(stamps[0], stamps[-1] - 0.5 * length, length)
+        rough = self._parts(solved, terms, edges).leap()
+        if rough is None:
+            return None
+        k = int(np.searchsorted(edges, rough))
+        near = stamps[(stamps > edges[k - 1]) & (stamps < (edges[k + 1] if k + 1 < len(edges) else np.inf))]
+        return self._parts(solved, terms, np.union1d(edges, near[:: max(1, len(near) // MOST_PARTS)])).leap()
+
+    def _parts(self, solved: Solved, terms: Terms, edges: Array) -> Parts:
+        """Return what the values from each of the stamps on tell of the clock, s, beyond the terms that are known."""
+        values, columns, seen = solved.clocks[self.name], {}, []
+        for one in self.seen:
+            if one.stream == self.name:
+                part = np.searchsorted(edges, one.stamps, "right") - 1
+                columns[one.key] = (part[:, None] == np.arange(len(edges))).astype(float)
+                one = replace(one, stamps=one.stamps + terms.columns(one.stamps) @ values)
+            seen.append(one)
+        none = np.zeros(len(edges))
+        unknown = {self.name: ClockTerms(columns, none, np.full(len(edges), OFFSET_STD), none)}
+        offsets, covariance = replace(solved.trajectory, seen=seen, clocks=unknown).shown(self.name)
+        return Parts(edges, 0.5 * (edges + np.append(edges[1:], self.stamps[-1])), offsets, covariance)
+
+
 def receiver_offset(body: Body, path: Path) -> Offset:
     """Find what to add to the stamps of a receiver to put them on the clock of the IMUs on a body.
 
     Its latency is part of that. Raises InputError where its motion is not that of the IMUs, or fits at several offsets.
     """
-    gnss = path.gnss
-    jerks = Jerks(gnss.time, path.position)
-    pair = f"{path.name} and the IMUs"
-    terms = Terms(float(np.round(np.mean(gnss.time[[0, -1]]))))
-    first = [np.array([coarse, 0.0]) for coarse in candidates(jerks, body.jerks, pair, JERK_WINDOW)]
-    solved, *others = sorted((solve(body, path, terms, values) for values in first), key=lambda one: one.misfit)
-    if not np.isfinite(solved.misfit):
-        raise InputError(f"time_offset: {path.name}: its motion does not fit that of the IMUs at any offset")
-    for other in others:
-        if other.misfit < WORSE * solved.misfit:
-            raise ambiguous(pair, solved.clocks[path.name][0], other.clocks[path.name][0])
-    for _ in range(MOST):
-        leap = _leap(solved, path, terms)
-        if leap is None:
-            break
-        terms = replace(terms, leaps=tuple(sorted((*terms.leaps, leap))))
-        solved = solve(body, path, terms, np.array([*solved.clocks[path.name][:2], *[0.0] * len(terms.leaps)]))
-    values = solved.clocks[path.name]
-    std = np.sqrt(np.diag(solved.covariance[path.name]) * max(1.0, solved.misfit))
-    leaps = zip(terms.leaps, values[2:].tolist(), std[2:].tolist(), strict=True)
-    return Offset(
-        path.name, float(values[0]), float(std[0]), None, float(values[1]), float(std[1]), terms.reference, tuple(leaps)
-    )
-
-
-def solve(body: Body, path: Path, terms: Terms, values: Array) -> Solved:
-    """Return the likeliest trajectory and clock, from first values of its terms, which must be right to half a second.
-
-    The misfit is infinite where least squares do not converge.
-    """
-    gnss, begin = path.gnss, values
-    for _ in range(ROUNDS):
-        time = gnss.time + terms.columns(gnss.time) @ begin
-        own, increments = body.within(float(time[0]) - MARGIN, float(time[-1]) + MARGIN)
-        cut = Increments.of(own, increments, node_length(own, gnss.time))
-        nodes = first_nodes(cut, time, path.position, gnss.velocity, path.world)
-        columns = {f"{one.stream}/{one.kind}": terms.columns(one.stamps) for one in path.seen}
-        clocks = {path.name: ClockTerms(columns, begin, terms.std, values)}
-        inertial = Inertial(cut, body.noise, body.start_std)
-        solved = Trajectory(path.world, inertial, path.seen, clocks, nodes).solve()
-        found = solved.clocks[path.name]
-        moved, begin = abs(found[0] - begin[0]), found
-        if solved.converged and moved < 0.5 * MARGIN:
-            return solved
-    return replace(solved, misfit=np.inf)
+    jerks = Jerks(path.gnss.time, path.position)
+    first = candidates(jerks, body.jerks, f"{path.name} and the IMUs", JERK_WINDOW)
+    return Problem(body, path, path.seen, path.name).offset(first)
 
 
 def node_length(time: Array, fixes: Array) -> int:
     """Return the epochs from one node to the next, so that not much happens between a node and a fix."""
     interval = float(np.median(np.diff(time)))
     return max(1, round(min(LONGEST_NODE, max(0.2, float(np.median(np.diff(fixes))))) / interval))
-
-
-def _leap(solved: Solved, path: Path, terms: Terms) -> float | None:
-    """Return the stamp of the first fix after a leap that the terms do not have, s."""
-    stamps = path.gnss.time
-    usual = float(np.median(np.diff(stamps)))
-    length = max(PART_S, LEAST_FIXES * usual, (stamps[-1] - stamps[0]) / MOST_PARTS)
-    edges = np.arange(stamps[0], stamps[-1] - 0.5 * length, length)
-    rough = _parts(solved, path, terms, edges).leap()
-    if rough is None:
-        return None
-    k = int(np.searchsorted(edges, rough))
-    near = stamps[(stamps > edges[k - 1]) & (stamps < (edges[k + 1] if k + 1 < len(edges) else np.inf))]
-    return _parts(solved, path, terms, np.union1d(edges, near)).leap()
-
-
-def _parts(solved: Solved, path: Path, terms: Terms, edges: Array) -> Parts:
-    """Return what the fixes from each of the stamps on tell of the clock, s, beyond the terms that are known."""
-    values, clocks, seen = solved.clocks[path.name], {}, []
-    for one in path.seen:
-        part = np.searchsorted(edges, one.stamps, "right") - 1
-        clocks[f"{one.stream}/{one.kind}"] = (part[:, None] == np.arange(len(edges))).astype(float)
-        seen.append(replace(one, stamps=one.stamps + terms.columns(one.stamps) @ values))
-    none = np.zeros(len(edges))
-    unknown = {path.name: ClockTerms(clocks, none, np.full(len(edges), OFFSET_STD), none)}
-    offsets, covariance = replace(solved.trajectory, seen=seen, clocks=unknown).shown(path.name)
-    middles = 0.5 * (edges + np.append(edges[1:], path.gnss.time[-1]))
-    return Parts(edges, middles, offsets, covariance)

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from polyins.calibration.preintegration import ERRORS, Preintegrated, cross, rotation, rotation_vector
+from polyins.calibration.preintegration import ERRORS, GYRO, Preintegrated, cross, rotation, rotation_vector
 from polyins.model.recording import Array
 
 STATES = 9 + ERRORS
@@ -45,7 +46,7 @@ class Nodes:
 class Instants:
     """The trajectory at M instants, each from the node before it."""
 
-    node: Array
+    node: NDArray[np.intp]
     """which, shape (M,)"""
     position: Array
     velocity: Array
@@ -64,7 +65,8 @@ class Instants:
     @classmethod
     def at(cls, time: Array, nodes: Nodes, measured: Preintegrated) -> Instants:
         """Return where the trajectory is at instants, s, shape (M,), within the span of the nodes."""
-        k = np.clip(np.searchsorted(measured.time[:, 0], time, "right") - 1, 0, len(measured.time) - 1)
+        found = np.searchsorted(measured.time[:, 0], time, "right") - 1
+        k = np.clip(found, 0, len(measured.time) - 1).astype(np.intp)
         edges = measured.time[k]
         j = np.clip(np.sum(edges <= time[:, None], axis=1) - 1, 0, edges.shape[1] - 2)
         rows = np.arange(len(time))
@@ -72,7 +74,7 @@ class Instants:
         part = (h[:, 0] / (edges[rows, j + 1] - edges[rows, j]))[:, None, None]
         since = (time - edges[:, 0])[:, None]
         turned_j, rate, force = measured.turned[k, j], measured.rate[k, j], measured.force[k, j]
-        gain = np.einsum("mab,mb->ma", turned_j, force) * h
+        gain = np.einsum("mab,mb->ma", turned_j, force + 0.5 * h * np.cross(rate, force)) * h
         turned = turned_j @ rotation(rate * h)
         velocity = measured.velocity[k, j] + gain
         position = measured.position[k, j] + h * (measured.velocity[k, j] + 0.5 * gain)
@@ -130,7 +132,7 @@ class Sightings:
     stream: str
     """whose clock stamps them"""
     kind: str
-    """position, velocity, heading, attitude, speed or height"""
+    """position, velocity, heading, attitude or speed"""
     stamps: Array
     """s, shape (M,)"""
     values: Array
@@ -139,6 +141,11 @@ class Sightings:
     """shape (M, D)"""
     arm: Array
     """of the point, m, from the IMU, in body axes"""
+
+    @property
+    def key(self) -> str:
+        """Names it among those of all streams."""
+        return f"{self.stream}/{self.kind}"
 
     @property
     def offset_std(self) -> Array:
@@ -166,11 +173,19 @@ def _position(seen: Sightings, at: Instants, offsets: Array) -> Predicted:
 def _velocity(seen: Sightings, at: Instants, offsets: Array) -> Predicted:
     moves = np.cross(at.rate, seen.arm)
     by = at.velocity_by - at.attitude @ cross(moves) @ at.turn_by
-    by[:, :, 9:12] += at.attitude @ cross(seen.arm)
+    by[:, :, SLOW] += at.attitude @ _arm_by_errors(at, seen.arm)
     by_time = at.gravity + _by(at.attitude, at.force + np.cross(at.rate, moves))
     return Predicted(
         seen.values - at.velocity - _by(at.attitude, moves), by, by_time, np.zeros((len(seen.stamps), 3, 0))
     )
+
+
+def _arm_by_errors(at: Instants, arm: Array) -> Array:
+    """Return how the velocity of a point about the IMU follows from the IMU's errors, in body axes, (M, 3, 12)."""
+    out = np.zeros((len(at.rate), 3, ERRORS))
+    out[:, :, GYRO[:3]] = cross(arm)
+    out[:, :, GYRO[3:]] = cross(arm) * at.rate[:, None, :]
+    return out
 
 
 def _heading(seen: Sightings, at: Instants, offsets: Array) -> Predicted:
@@ -192,20 +207,11 @@ def _attitude(seen: Sightings, at: Instants, offsets: Array) -> Predicted:
 def _speed(seen: Sightings, at: Instants, offsets: Array) -> Predicted:
     there = _by(at.attitude.mT, at.velocity) + np.cross(at.rate, seen.arm)
     by = at.attitude.mT @ at.velocity_by + cross(_by(at.attitude.mT, at.velocity)) @ at.turn_by
+    by[:, :, SLOW] += _arm_by_errors(at, seen.arm)
     by_time = at.force + _by(at.attitude.mT, at.gravity) - np.cross(at.rate, _by(at.attitude.mT, at.velocity))
     scale = 1.0 + offsets[0]
     speed = there[:, :1]
     return Predicted(seen.values - scale * speed, scale * by[:, :1], scale * by_time[:, :1], speed[:, :, None])
-
-
-def _height(seen: Sightings, at: Instants, offsets: Array) -> Predicted:
-    whole = _position(replace(seen, values=np.zeros((len(seen.stamps), 3))), at, offsets)
-    return Predicted(
-        seen.values - whole.residual[:, 2:] - offsets[0],
-        -whole.by_states[:, 2:],
-        -whole.by_time[:, 2:],
-        np.ones((len(seen.stamps), 1, 1)),
-    )
 
 
 KINDS: dict[str, Callable[[Sightings, Instants, Array], Predicted]] = {
@@ -214,7 +220,6 @@ KINDS: dict[str, Callable[[Sightings, Instants, Array], Predicted]] = {
     "heading": _heading,
     "attitude": _attitude,
     "speed": _speed,
-    "height": _height,
 }
-OFFSETS = {"heading": (0.5,), "attitude": (0.2, 0.2, 0.5), "speed": (0.05,), "height": (200.0,)}
-"""rad; rad; relative; m"""
+OFFSETS = {"heading": (0.5,), "attitude": (0.2, 0.2, 0.5), "speed": (0.05,)}
+"""rad; rad; relative"""

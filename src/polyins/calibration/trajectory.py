@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from polyins.calibration.preintegration import Increments, Preintegrated, cross, rotation, rotation_vector
-from polyins.calibration.sightings import POSITION, SLOW, STATES, TURN, VELOCITY, Instants, Nodes, Sightings
+from polyins.calibration.sightings import POSITION, SLOW, STATES, TURN, VELOCITY, Instants, Nodes, Predicted, Sightings
 from polyins.model.recording import Array
 from polyins.model.rig import NoiseGrade
 
-ROUNDS = 60
+ROUNDS = 40
 STILL = 1e-3
 """of its std: clocks that move less have converged"""
 HUBER = 3.0
@@ -71,7 +71,7 @@ class ClockTerms:
     """The terms of what is added to the stamps of a stream, one column each."""
 
     columns: Mapping[str, Array]
-    """by kind of value, shape (M, P) each"""
+    """by the key of what they stamp, shape (M, P) each"""
     values: Array
     """shape (P,)"""
     std: Array
@@ -131,7 +131,7 @@ class _Normal:
             block, carried = answer[:, : wide.shape[1] - shared - 1], answer[:, wide.shape[1] - shared - 1 :]
             corner = corner - right[:, :shared].T @ carried
             solved.append(answer)
-        covariance = np.linalg.inv(corner[:, :shared])
+        covariance = np.asarray(np.linalg.inv(corner[:, :shared]), dtype=np.float64)
         step = covariance @ corner[:, shared]
         nodes = np.zeros((count, size))
         for k in range(count - 1, -1, -1):
@@ -139,7 +139,7 @@ class _Normal:
             nodes[k] = answer[:, -1] - answer[:, -1 - shared : -1] @ step
             if k < count - 1:
                 nodes[k] -= answer[:, :size] @ nodes[k + 1]
-        return nodes, step, covariance
+        return nodes, np.asarray(step, dtype=np.float64), covariance
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class Trajectory:
     clocks: Mapping[str, ClockTerms]
     nodes: Nodes
     offsets: Mapping[str, Array] = field(default_factory=dict)
-    """constant errors of sensors, by kind"""
+    """constant errors of sensors, by the keys of what they show"""
 
     def solve(self) -> Solved:
         """Return the least-squares solution, by damped Gauss-Newton steps."""
@@ -195,7 +195,7 @@ class Trajectory:
         """Return where the unknowns that are no node's stand: clocks, then constant errors."""
         where, begin = {}, 0
         sizes = {name: len(clock.values) for name, clock in self.clocks.items()}
-        sizes |= {seen.kind: len(seen.offset_std) for seen in self.seen}
+        sizes |= {seen.key: len(seen.offset_std) for seen in self.seen}
         for name, size in sizes.items():
             where[name], begin = slice(begin, begin + size), begin + size
         return where
@@ -203,11 +203,11 @@ class Trajectory:
     def _moved(self, nodes: Array, step: Array) -> Trajectory:
         where = self._columns()
         clocks = {name: replace(clock, values=clock.values + step[where[name]]) for name, clock in self.clocks.items()}
-        offsets = {seen.kind: self._offsets(seen) + step[where[seen.kind]] for seen in self.seen}
+        offsets = {seen.key: self._offsets(seen) + step[where[seen.key]] for seen in self.seen}
         return replace(self, nodes=self.nodes.moved(nodes), clocks=clocks, offsets=offsets)
 
     def _offsets(self, seen: Sightings) -> Array:
-        return np.asarray(self.offsets.get(seen.kind, np.zeros(len(seen.offset_std))))
+        return np.asarray(self.offsets.get(seen.key, np.zeros(len(seen.offset_std))))
 
     def _normal(self) -> _Normal:
         count, where = len(self.nodes.position), self._columns()
@@ -224,7 +224,7 @@ class Trajectory:
         for name, clock in self.clocks.items():
             _add_prior(normal, where[name], clock.values - clock.about, clock.std)
         for seen in self.seen:
-            _add_prior(normal, where[seen.kind], self._offsets(seen), seen.offset_std)
+            _add_prior(normal, where[seen.key], self._offsets(seen), seen.offset_std)
         return normal
 
     def _add_start(self, normal: _Normal) -> None:
@@ -274,9 +274,12 @@ class Trajectory:
         normal.right[1:] -= np.einsum("kba,kb->ka", after, residual)
         normal.cost += float(np.sum(residual**2))
 
-    def _predicted(self, seen: Sightings, measured: Preintegrated):  # type: ignore[no-untyped-def]
+    def _predicted(
+        self, seen: Sightings, measured: Preintegrated
+    ) -> tuple[Sightings, tuple[Instants, Array], Predicted]:
+        """Return the values within the trajectory, their instants and the terms of their clock, and what is predicted."""
         clock = self.clocks.get(seen.stream)
-        columns = np.zeros((len(seen.stamps), 0)) if clock is None else clock.columns[f"{seen.stream}/{seen.kind}"]
+        columns = np.zeros((len(seen.stamps), 0)) if clock is None else clock.columns[seen.key]
         time = seen.stamps if clock is None else seen.stamps + columns @ clock.values
         within = (time >= measured.time[0, 0]) & (time <= measured.time[-1, -1])
         part = seen.at(within)
@@ -293,7 +296,7 @@ class Trajectory:
         shared = np.zeros((*residual.shape, normal.corner.shape[0]))
         if seen.stream in self.clocks:
             shared[:, :, where[seen.stream]] = (predicted.by_time * root)[:, :, None] * columns[:, None, :]
-        shared[:, :, where[seen.kind]] = predicted.by_offsets * root[:, :, None]
+        shared[:, :, where[seen.key]] = predicted.by_offsets * root[:, :, None]
         np.add.at(normal.own, at.node, by.mT @ by)
         np.add.at(normal.shared, at.node, by.mT @ shared)
         np.add.at(normal.right, at.node, np.einsum("mdb,md->mb", by, residual))

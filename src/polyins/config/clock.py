@@ -20,8 +20,8 @@ class ClockSettings(Section):
     clock_reference_s: Number = 0.0
     """the stamp at which the drift adds nothing, s; without a drift it says nothing"""
     clock_leaps_s: tuple[Pair, ...] = ()
-    """[stamp, s] of each leap of the clock: from that stamp on so much more is added; the larger, the later what follows
-    counts"""
+    """[stamp, s] of each leap of the clock: from that stamp on so much more is added; the larger, the later what
+    follows counts"""
     time_offset: Literal["estimate"] | None = None
     """estimate: what is left of the clock's offset, drift and leaps is found from the motion that others show too"""
 

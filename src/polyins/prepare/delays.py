@@ -226,9 +226,10 @@ def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Find
     if abs(size) > HOPELESS and 1 < len(off) == len(found) and agree:
         late = "late" if size > 0.0 else "early"
         more, keys = _drifting(trend, size)
+        digits = 1 if trend is None else 3
         raise InputError(
             f"GNSS: its course turns as the gyros do, {abs(size):.1f} s {late} all along{more}; expected one clock:"
-            f" gnss.clock_offset_s: {-size:.{1 if trend is None else 3}f}{keys} corrects that, or gnss.time_offset: estimate"
+            f" gnss.clock_offset_s: {-size:.{digits}f}{keys} corrects that, or gnss.time_offset: estimate"
         )
     std = float(np.median(gnss.position_std[:, :2]))
     largest = max(abs(size), *map(abs, expected)) if trend is not None else abs(size)

@@ -11,7 +11,7 @@ import numpy as np
 
 from polyins.config import Config, GnssEntry, ImuEntry, ReferenceEntry, SensorEntry
 from polyins.config.clock import ClockSettings
-from polyins.config.yaml_document import Document
+from polyins.config.yaml_document import Document, Key
 from polyins.formats import rtklib, written_table
 from polyins.formats.columns import is_parquet
 from polyins.formats.recognize import log_format, read_log
@@ -49,12 +49,12 @@ def on_one_clock(config: Config, document: Document, imus: Sequence[ReadImu]) ->
     Those not marked share one clock. Raises InputError where the motion does not tell an offset, and where every clock
     is marked.
     """
-    streams, offsets = tuple(one.stream for one in imus), ()
+    streams = tuple(one.stream for one in imus)
+    offsets: tuple[Offset, ...] = ()
     if any(entry.time_offset for entry in config.imus):
         offsets = _of_imus(config, document, [one.imu for one in imus], streams)
         entries = tuple(
-            _settled(entry, next((found for found in offsets if found.name == entry.name), None))
-            for entry in config.imus
+            _settled(entry, next((one for one in offsets if one.name == entry.name), None)) for entry in config.imus
         )
         config = config.model_copy(update={"imus": entries})
         streams = tuple(in_array_axes(one.rows, entry) for one, entry in zip(imus, entries, strict=True))
@@ -69,6 +69,13 @@ def on_one_clock(config: Config, document: Document, imus: Sequence[ReadImu]) ->
         offsets = (*offsets, found)
         config = config.model_copy(update={name: _settled(entry, found)})
     return OneClock(config, streams, offsets)
+
+
+def to_be_found(config: Config) -> list[list[Key]]:
+    """Return where it stands that a clock is to be estimated."""
+    imus: list[list[Key]] = [["imus", i, "time_offset"] for i, entry in enumerate(config.imus) if entry.time_offset]
+    others: list[list[Key]] = [[name, "time_offset"] for name, entry in _others(config) if entry.time_offset]
+    return [*imus, *others]
 
 
 def described(offset: Offset, first: float) -> Finding:
@@ -120,9 +127,7 @@ def _movers(config: Config, imus: Sequence[Imu], streams: Sequence[ImuStream]) -
     return Movers(imus, streams, config.filter.gravity_m_s2)
 
 
-def _of_other(
-    name: str, config: Config, document: Document, movers: Movers, gnss: ConfiguredGnss | None
-) -> Offset:
+def _of_other(name: str, config: Config, document: Document, movers: Movers, gnss: ConfiguredGnss | None) -> Offset:
     """Return what brings a stream that is no IMU's to the clock of the IMUs."""
     if name == "gnss":
         return _of_gnss(config, document, movers)
@@ -132,9 +137,12 @@ def _of_other(
             entry = config.reference.model_copy(update={"position_lag_s": 0.0})
             reference, geodetic, _ = read_reference(entry, document, ALWAYS)
             return movers.of_reference(reference, geodetic)
-        entries_by_kind = dict(entries(config))
-        stream, _ = read_sensor(name, entries_by_kind[name], document, ALWAYS)
-        return movers.of_sensor(stream, None if gnss is None else gnss.stream)
+        sensor = dict(entries(config))[name]
+        stream, _ = read_sensor(name, sensor, document, ALWAYS)
+        path = None
+        if gnss is not None and config.gnss is not None:
+            path = movers.path(gnss.stream, gnss.geodetic, np.array(config.gnss.antenna_position_m))
+        return movers.of_sensor(stream, np.array(sensor.position_m), path)
 
 
 def _of_gnss(config: Config, document: Document, movers: Movers) -> Offset:

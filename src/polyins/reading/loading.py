@@ -15,7 +15,7 @@ from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
 from polyins.model.findings import Finding
-from polyins.model.recording import FilterOptions, Heights, ImuStream, Offset, Recording
+from polyins.model.recording import FilterOptions, Heights, ImuStream, Recording
 from polyins.model.rig import Imu, Rig
 from polyins.reading import catalogue, clocks, usable
 from polyins.reading.imu_stream import as_mounted, read_imu
@@ -189,11 +189,8 @@ def without_data(config: Config, document: Document) -> tuple[Recording, tuple[s
     Raises InputError for settings that need data beforehand.
     """
     notes = wheel_checks.check_settings(config, document)
-    for index, entry in enumerate(config.imus):
-        if entry.time_offset:
-            raise document.error(
-                ["imus", index, "time_offset"], "is found from a whole recording; expected clock_offset_s"
-            )
+    for keys in clocks.to_be_found(config.model_copy(update={"reference": None})):
+        raise document.error(keys, "is found from a whole recording; expected clock_offset_s")
     if config.start.heading_from == "reference":
         raise document.error(
             ["start", "heading_from"], "is reference, which live data have not; expected heading_deg or gnss-course"

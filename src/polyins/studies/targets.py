@@ -19,6 +19,13 @@ TARGETS = (
         print_tables="polyins.studies.wid:print_tables",
     ),
     Target("array", "polyins.studies.array:reproduce", seconds=(10, 240)),
+    Target(
+        "clocks",
+        "polyins.studies.clocks:reproduce",
+        datasets=("quadrotor",),
+        seconds=(30, 250),
+        print_tables="polyins.studies.clocks:print_tables",
+    ),
     Target("consistency", "polyins.studies.consistency:reproduce"),
     Target(
         "starts",
