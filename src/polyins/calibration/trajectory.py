@@ -277,7 +277,7 @@ class Trajectory:
     def _predicted(
         self, seen: Sightings, measured: Preintegrated
     ) -> tuple[Sightings, tuple[Instants, Array], Predicted]:
-        """Return the values within the trajectory, their instants and the terms of their clock, and what is predicted."""
+        """Return the values within the trajectory, their instants, the terms of their clock, and what is predicted."""
         clock = self.clocks.get(seen.stream)
         columns = np.zeros((len(seen.stamps), 0)) if clock is None else clock.columns[seen.key]
         time = seen.stamps if clock is None else seen.stamps + columns @ clock.values

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Clocked = TypeVar("Clocked", bound=ClockSettings)
 
-CLOCK, LEAP = "clock", "clock leap"
+CLOCK, LEAP = "clock found", "clock leap"
 """kinds of findings: what was estimated, and that a clock was set anew"""
 ALWAYS = (-np.inf, np.inf)
 ESTIMATE = "estimate"
