@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,7 +153,7 @@ class Sightings:
         """How little is known beforehand of what is constant in the error, shape (C,)."""
         return np.array(OFFSETS.get(self.kind, ()), dtype=float)
 
-    def at(self, rows: Array) -> Sightings:
+    def at(self, rows: NDArray[Any]) -> Sightings:
         """Return some of them."""
         return replace(self, stamps=self.stamps[rows], values=self.values[rows], std=self.std[rows])
 
