@@ -8,10 +8,12 @@ import pytest
 
 from polyins.config.yaml_document import write_yaml
 from polyins.errors import InputError
+from polyins.formats.rows import ImuRows, RowSource
 from polyins.live.conversion import Conversion
 from polyins.live.source import RefusedError
-from polyins.navigate.samples import GnssFix, ImuSample
+from polyins.navigate.samples import GnssFix, ImuSample, SensorSample
 from polyins.reading import loading
+from polyins.reading.imu_stream import in_array_axes
 
 IMU = {"name": "a", "axes": ["x", "-y", "-z"], "mount_deg": [0.0, 0.0, 90.0], "clock_offset_s": -2.5}
 FIX = GnssFix(7.0, np.array([0.8, 0.2, 500.0]), np.ones(3), np.ones(3), np.ones(3))
@@ -41,6 +43,33 @@ def test_increments_are_turned_and_clocks_put_right(tmp_path: Path) -> None:
     same = one.taken(ImuSample("b", 10.0, np.array([1.0, 2.0, 3.0]), np.zeros(3)))
     np.testing.assert_array_equal(same.dtheta, [1.0, 2.0, 3.0])
     assert refusal(one, same._replace(imu="c")) == "unknown IMU"
+
+
+def test_clocks_that_drift_and_leap_give_the_bits_of_a_batch(tmp_path: Path) -> None:
+    clock = {"clock_offset_s": -0.3, "clock_drift_ppm": 257.0, "clock_reference_s": 3.7, "clock_leaps_s": [[8.0, 0.2]]}
+    drifting = {**IMU, "name": "b", **clock}
+    path = tmp_path / "drifts.yaml"
+    path.write_text(write_yaml({"imus": [drifting], "gnss": clock, "height": {"std_m": 1.0, **clock}}))
+    settings = loading.read_config(path)
+    one = Conversion(settings.config, True)
+    rng = np.random.default_rng(1)
+    rows = ImuRows(RowSource(""), np.arange(5.0, 12.0, 0.7), *rng.normal(0.0, 1.0, (2, 10, 3)))
+    batch = in_array_axes(rows, settings.config.imus[0])
+    for k, time in enumerate(rows.time.tolist()):
+        live = one.taken(ImuSample("b", time, rows.dtheta[k], rows.dvel[k]))
+        assert live.time == batch.time[k]
+        np.testing.assert_array_equal(live.dtheta, batch.dtheta[k])
+        np.testing.assert_array_equal(live.dvel, batch.dvel[k])
+    expected = -0.3 + 257e-6 * (7.0 - 3.7)
+    assert one.taken(FIX).time == pytest.approx(7.0 + expected, abs=1e-12)
+    later = SensorSample("height", 8.0, 500.0, None)
+    assert one.taken(later).time == pytest.approx(8.2 - 0.3 + 257e-6 * 4.3, abs=1e-12)
+
+
+@pytest.mark.parametrize("section", ["gnss", "height", "heading", "odometer"])
+def test_no_clock_is_estimated_live(section: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"{section}.time_offset: is found from a whole recording"):
+        conversion(tmp_path, **{section: {"time_offset": "estimate"}})
 
 
 def test_fixes_as_configured(tmp_path: Path) -> None:

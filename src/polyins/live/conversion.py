@@ -8,7 +8,7 @@ from polyins.config import Config
 from polyins.live.source import RefusedError
 from polyins.navigate.samples import Array, GnssFix, ImuSample, Sample, SensorSample
 from polyins.reading import sensor_stream
-from polyins.reading.imu_stream import increments_matrix
+from polyins.reading.imu_stream import increments_matrix, turned
 from polyins.reading.position_stream import height_shift, on_plane
 
 
@@ -34,7 +34,7 @@ class Conversion:
         matrix, time = self.matrices[sample.imu], self.clocks[sample.imu].common(sample.time)
         if matrix is None:
             return sample._replace(time=time)
-        return ImuSample(sample.imu, time, matrix @ sample.dtheta, matrix @ sample.dvel)
+        return ImuSample(sample.imu, time, *(turned(matrix, one[None])[0] for one in (sample.dtheta, sample.dvel)))
 
     def _sensor(self, sample: SensorSample) -> SensorSample:
         entry = self.sensors.get(sample.kind)

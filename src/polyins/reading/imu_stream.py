@@ -87,7 +87,7 @@ def measured(rows: ImuRows, entry: ImuEntry, *, alone: bool, first_row: int = 0)
 def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
     """Return rows as increments in array axes, on a wheel in the module's, on the recording's clock."""
     matrix = increments_matrix(entry)
-    dtheta, dvel = _turned(matrix, rows.dtheta), _turned(matrix, rows.dvel)
+    dtheta, dvel = turned(matrix, rows.dtheta), turned(matrix, rows.dvel)
     return ImuStream(entry.name, entry.clock.common(rows.time), dtheta, dvel)
 
 
@@ -168,7 +168,8 @@ def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:
     return mount_rotation(entry.mount_deg) @ axes_matrix(entry.axes)
 
 
-def _turned(rotation: Array, increments: Array) -> Array:
+def turned(rotation: Array, increments: Array) -> Array:
+    """Return vectors, (T, 3), in the axes to which the matrix leads, to the same bits one by one and all at once."""
     if np.array_equal(rotation, np.eye(3)):
         return increments
     # a matrix product would wake every BLAS thread for a 3 x 3 matrix
