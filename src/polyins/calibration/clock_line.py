@@ -7,18 +7,15 @@ window's time t by the clock, and an error of the clock by d changes it by A dx/
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from polyins.calibration.leaps import MOST, Parts
+from polyins.calibration.motion import Signals
 from polyins.calibration.regression import blocks, fit, huber
 from polyins.model.clock import Clock
 from polyins.model.recording import Array
 from polyins.model.rig import PPM
-
-if TYPE_CHECKING:
-    from polyins.calibration.offsets import Signals
 
 NEAR = 60.0
 """s to both sides of the middle, in which a drift does not spoil what is linear; from there it is followed outwards"""

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from polyins.calibration.clock_line import Pair
-from polyins.calibration.motion import RunningSums, motion
+from polyins.calibration.motion import RunningSums, Signals, motion
 from polyins.calibration.regression import huber
 from polyins.calibration.wheels import spin_axis, turns
 from polyins.errors import InputError
@@ -45,21 +45,6 @@ RIVAL = 0.7
 """A second peak with this part of the first one's information makes the offset ambiguous."""
 LOBE = 3.0  # s: nearer than this it is the same peak
 LEAST_CORRELATION = 0.8
-
-
-class Signals(Protocol):
-    """What two streams are compared by."""
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """First and last instant, s."""
-
-    @property
-    def least(self) -> float:
-        """Rms of what happens in a window, below which it is no motion."""
-
-    def between(self, begin: Array, end: Array) -> Array:
-        """Return what happened from `begin` to `end`, shape (M, K)."""
 
 
 @dataclass(frozen=True)
