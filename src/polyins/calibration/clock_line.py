@@ -20,8 +20,8 @@ from polyins.model.rig import PPM
 NEAR = 60.0
 """s to both sides of the middle, in which a drift does not spoil what is linear; from there it is followed outwards"""
 ROUNDS = 4
-DRIFT_STD = 500.0 * PPM
-"""relative: what is known of a drift beforehand; crystals have 20 to 100 ppm"""
+DRIFT_STD = 100.0 * PPM
+"""relative: what is known of a drift beforehand; crystals have up to 100 ppm"""
 PART_WINDOWS = 20
 """windows in a part in which a leap is looked for"""
 MOST_PARTS = 60

@@ -42,7 +42,7 @@ IMUS: Mapping[str, Mapping[str, Any]] = {
     "16 consumer-mems": {"noise": "consumer-mems", "imus": {"count": 16}},
     "1 tactical": {"noise": "tactical", "imus": {"count": 1}},
 }
-SEEDS, QUICK_SEEDS = 10, 2
+SEEDS, QUICK_SEEDS = 8, 2
 
 Document = dict[str, Any]
 
