@@ -1,17 +1,20 @@
 """A receiver whose clock has an offset and a drift, which the log does not say."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
-from polyins.config.yaml_document import Document, read_yaml
+from polyins.cli import cli
+from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
 from polyins.evaluation.summary import summarize
 from polyins.model.recording import Recording
 from polyins.model.rig import PPM
 from polyins.navigate import batch
-from polyins.reading.loading import load_document
+from polyins.reading.loading import load, load_document
 
 OFFSET_S, DRIFT = -3.7, 257.0 * PPM
 """of GNSS, at its stamp 3.7 s"""
@@ -45,6 +48,25 @@ def test_gnss_comes_to_the_clock_of_the_imu(logs: Path) -> None:
     (offset,) = recording(logs, "gnss", time_offset="estimate").clock_offsets
     assert offset.clock.common(3.7) == pytest.approx(3.7 + OFFSET_S, abs=0.01)
     assert offset.drift == pytest.approx(DRIFT, abs=30.0 * PPM)
+
+
+def test_calibrate_writes_the_clock(logs: Path, tmp_path: Path) -> None:
+    known = recording(logs, "imus", time_offset="estimate").clock_offsets[0]
+    document = read_yaml(logs / "cases/clock-drift/config.yaml")
+    document.values["imus"][0]["time_offset"] = "estimate"
+    for section in (document.values["imus"][0], document.values["gnss"], document.values["reference"]):
+        section["file"] = str(document.path.parent / f"{section['file']}.gz")
+    (tmp_path / "drive.yaml").write_text(write_yaml(document.values))
+    out = tmp_path / "elsewhere" / "known.yaml"
+    result = CliRunner().invoke(cli, ["calibrate", str(tmp_path / "drive.yaml"), "--out", str(out), "--json"])
+    assert result.exit_code == 0, result.exception
+    told = json.loads(result.stdout)["clock_offsets"]["imu1"]
+    assert told["drift_ppm"] == pytest.approx(known.drift / PPM)
+    assert told["drift_std_ppm"] < 6.0
+    settled = load(out)
+    assert settled.clock_offsets == ()
+    reference = recording(logs, "imus", time_offset="estimate")
+    assert settled.imus[0].time == pytest.approx(reference.imus[0].time, abs=1e-6)
 
 
 def test_without_the_key_offset_and_drift_are_named(logs: Path) -> None:

@@ -43,8 +43,8 @@ def calibrated(values: Values, config: Config, calibration: Calibration, folder:
         if other is not None:
             _settle(new[section], other, found.get(NAMES.get(section, section)))
     if folder is not None and "dataset" not in new:
-        for section in (*new["imus"], new.get("gnss"), new.get("reference")):
-            if section:
+        for section in (*new["imus"], *map(new.get, STREAMS)):
+            if section and section.get("file"):
                 section["file"] = str(folder / Path(section["file"]).expanduser())
     return _heading(calibration) + write_yaml(new)
 
