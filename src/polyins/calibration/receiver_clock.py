@@ -29,6 +29,8 @@ OFFSET_STD = 10.0
 JERK_WINDOW = 0.5
 """s from one jerk to one that differs"""
 ROUNDS = 3
+NEARBY = 8
+"""values to both sides of a leap, among which its place is looked for once its size is known"""
 WORSE = 2.0
 """times the misfit of the best offset, from which another one is none"""
 PART_S, LEAST_FIXES, MOST_PARTS = 5.0, 4, 60
@@ -157,8 +159,13 @@ class Problem:
             leap = self._leap(solved, terms)
             if leap is None:
                 break
-            terms = replace(terms, leaps=tuple(sorted((*terms.leaps, leap))))
-            solved = self.solve(terms, np.array([*solved.clocks[self.name][:2], *[0.0] * len(terms.leaps)]))
+            known = terms
+            for _ in range(ROUNDS):
+                terms = replace(known, leaps=tuple(sorted((*known.leaps, leap))))
+                solved = self.solve(terms, np.array([*solved.clocks[self.name][:2], *[0.0] * len(terms.leaps)]))
+                leap, before = self._placed(solved, terms, leap), leap
+                if leap == before:
+                    break
         if not np.isfinite(solved.misfit):
             raise InputError(f"time_offset: the motions of {pair} do not fit at any offset; expected one drive")
         values = solved.clocks[self.name].tolist()
@@ -169,13 +176,14 @@ class Problem:
     def solve(self, terms: Terms, values: Array) -> Solved:
         """Return the likeliest trajectory and clock; the misfit is infinite where least squares do not converge."""
         gnss, begin = self.path.gnss, values
+        known = np.concatenate([values[:1], np.zeros(len(values) - 1)])
         for _ in range(ROUNDS):
             time = gnss.time + (terms.columns(gnss.time) @ begin if self.name == self.path.name else 0.0)
             own, increments = self.body.within(float(time[0]) - MARGIN, float(time[-1]) + MARGIN)
             cut = Increments.of(own, increments, node_length(own, gnss.time))
             nodes = first_nodes(cut, time, self.path.position, gnss.velocity, self.path.world)
             columns = {one.key: terms.columns(one.stamps) for one in self.seen}
-            clocks = {self.name: ClockTerms(columns, begin, terms.std, values)}
+            clocks = {self.name: ClockTerms(columns, begin, terms.std, known)}
             inertial = Inertial(cut, self.body.noise, self.body.start_std)
             solved = Trajectory(self.path.world, inertial, self.seen, clocks, nodes).solve()
             found = solved.clocks[self.name]
@@ -198,6 +206,25 @@ class Problem:
         k = int(np.searchsorted(edges, rough))
         near = stamps[(stamps > edges[k - 1]) & (stamps < (edges[k + 1] if k + 1 < len(edges) else np.inf))]
         return self._parts(solved, terms, np.union1d(edges, near[:: max(1, len(near) // MOST_PARTS)])).leap()
+
+    def _placed(self, solved: Solved, terms: Terms, leap: float) -> float:
+        """Return the stamp from which on a leap fits best, among those nearby, s."""
+        values, index = solved.clocks[self.name], 2 + terms.leaps.index(leap)
+        gains: dict[float, float] = {}
+        for one in self.seen:
+            if one.stream != self.name:
+                continue
+            middle = int(np.searchsorted(one.stamps, leap))
+            near = one.at(np.arange(max(0, middle - NEARBY), min(middle + NEARBY, len(one.stamps))))
+            columns, squares = terms.columns(near.stamps), []
+            for there in (0.0, 1.0):
+                columns[:, index] = there
+                squares.append(solved.trajectory.misfits(near, near.stamps + columns @ values))
+            # what is won by counting each and all later ones as after the leap
+            won = np.cumsum((squares[0] - squares[1])[::-1])[::-1]
+            for stamp, gain in zip(near.stamps.tolist(), won.tolist(), strict=True):
+                gains[stamp] = gains.get(stamp, 0.0) + gain
+        return max(gains, key=lambda stamp: gains[stamp])
 
     def _parts(self, solved: Solved, terms: Terms, edges: Array) -> Parts:
         """Return what the values from each of the stamps on tell of the clock, s, beyond the terms that are known."""

@@ -176,6 +176,13 @@ class Trajectory:
             done = False
         return problem._solved(normal, done)
 
+    def misfits(self, seen: Sightings, time: Array) -> Array:
+        """Return the squares of the residuals of values, each over its std, if they are measured then, shape (M,)."""
+        measured = self.imu.increments.preintegrated(self.nodes.errors[:-1])
+        at = Instants.at(np.clip(time, measured.time[0, 0], measured.time[-1, -1]), self.nodes, measured)
+        residual = seen.predicted(at, self._offsets(seen)).residual
+        return np.asarray(np.sum((residual / seen.std) ** 2, axis=1))
+
     def _solved(self, normal: _Normal, converged: bool) -> Solved:
         covariance = normal.solve(0.0)[2]
         where = self._columns()
