@@ -366,7 +366,8 @@ def calibrate(config: Path, out: Path | None, as_json: bool) -> None:
     print_table(recording.name, listing.COLUMNS, listing.rows(calibration))
     for warning in (*warnings, *recording.sentences, *calibration.warnings):
         say(f"warning: {warning}")
-    say(f"forward: {calibration.forward_from}" if wheels else listing.agreed(calibration))
+    if wheels or calibration.agreement:
+        say(f"forward: {calibration.forward_from}" if wheels else listing.agreed(calibration))
     say(f"configuration: {target}")
 
 

@@ -118,7 +118,7 @@ def test_known_clocks_and_estimated_ones_give_the_same_streams(files: Path) -> N
         assert found.gnss is not None
         assert known.gnss is not None
         assert found.gnss.time[-1] == pytest.approx(known.gnss.time[-1], abs=8e-3)
-        assert sum("estimated from the motion" in text for text in found.warnings) == len(marked)
+        assert sum("estimated from the motion" in text for text in found.sentences) == len(marked)
 
 
 def reversed_axes(values: dict[str, Any]) -> dict[str, Any]:

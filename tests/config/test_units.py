@@ -170,24 +170,25 @@ ELSEWHERE: dict[str, set[str]] = {
     "AidingSensor": {"kind", "offset_random_walk"},
 }
 """fields that no key of a section gives by itself: they follow from several or from the section, or a run sets them"""
+CLOCK = set(config.clock.ClockSettings.model_fields)
 OTHERWISE: dict[str, set[str]] = {
     "Noise": {"grade"},
     "WheelEntry": {"spin_axis", "side", "tilt_deg"},
     "ImuEntry": {
-        "format", "columns", "rate_hz", "clock_offset_s", "time_offset", "gyro_range_deg_s", "axes", "mount_deg",
-        "gyro_matrix", "accel_matrix", "file", "stream",
+        "format", "columns", "rate_hz", "gyro_range_deg_s", "axes", "mount_deg", "gyro_matrix", "accel_matrix", "file",
+        "stream", *CLOCK,
     },
     "Fixes": {"lies"},
     "WheelModule": {"name", "position_m", "chips", "calibrated", "slip"},
     "ReplayedDrive": {"file", "from_s", "to_s", "position_std_m"},
     "SensorErrors": {"vibration_m_s2", "common_noise_share", "common_drift_share"},
     **{
-        name: {"file", "stream", "rate_hz", "columns", "clock_offset_s", key} for name, key in
+        name: {"file", "stream", "rate_hz", "columns", key, *CLOCK} for name, key in
         (("HeightEntry", "std_m"), ("HeadingEntry", "std_deg"))
     },
     "OdometerEntry": {
-        "file", "stream", "rate_hz", "columns", "clock_offset_s", "std_m_s", "right_std_m_s", "down_std_m_s",
-        "constraint_interval_s",
+        "file", "stream", "rate_hz", "columns", "std_m_s", "right_std_m_s", "down_std_m_s", "constraint_interval_s",
+        *CLOCK,
     },
 }  # fmt: skip
 """keys that say where data are and what is made of them before they reach the filter"""

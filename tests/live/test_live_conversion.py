@@ -11,7 +11,7 @@ from polyins.errors import InputError
 from polyins.formats.rows import ImuRows, RowSource
 from polyins.live.conversion import Conversion
 from polyins.live.source import RefusedError
-from polyins.navigate.samples import GnssFix, ImuSample
+from polyins.navigate.samples import GnssFix, ImuSample, SensorSample
 from polyins.reading import loading
 from polyins.reading.imu_stream import in_array_axes, mount_rotation
 
@@ -59,6 +59,33 @@ def test_matrices_correct_as_in_a_recording_to_the_last_bit(tmp_path: Path) -> N
     expected = mount_rotation((1.0, 2.0, 30.0)) @ np.diag([1.0, -1.0, -1.0])
     np.testing.assert_allclose(stream.dtheta, dtheta @ (expected @ matrix).T, atol=1e-12)
     np.testing.assert_allclose(stream.dvel, dvel @ expected.T, atol=1e-12)
+
+
+def test_clocks_that_drift_and_leap_give_the_bits_of_a_batch(tmp_path: Path) -> None:
+    clock = {"clock_offset_s": -0.3, "clock_drift_ppm": 257.0, "clock_reference_s": 3.7, "clock_leaps_s": [[8.0, 0.2]]}
+    drifting = {**IMU, "name": "b", **clock}
+    path = tmp_path / "drifts.yaml"
+    path.write_text(write_yaml({"imus": [drifting], "gnss": clock, "height": {"std_m": 1.0, **clock}}))
+    settings = loading.read_config(path)
+    one = Conversion(settings.config, True)
+    rng = np.random.default_rng(1)
+    rows = ImuRows(RowSource(""), np.arange(5.0, 12.0, 0.7), *rng.normal(0.0, 1.0, (2, 10, 3)))
+    batch = in_array_axes(rows, settings.config.imus[0])
+    for k, time in enumerate(rows.time.tolist()):
+        live = one.taken(ImuSample("b", time, rows.dtheta[k], rows.dvel[k]))
+        assert live.time == batch.time[k]
+        np.testing.assert_array_equal(live.dtheta, batch.dtheta[k])
+        np.testing.assert_array_equal(live.dvel, batch.dvel[k])
+    expected = -0.3 + 257e-6 * (7.0 - 3.7)
+    assert one.taken(FIX).time == pytest.approx(7.0 + expected, abs=1e-12)
+    later = SensorSample("height", 8.0, 500.0, None)
+    assert one.taken(later).time == pytest.approx(8.2 - 0.3 + 257e-6 * 4.3, abs=1e-12)
+
+
+@pytest.mark.parametrize("section", ["gnss", "height", "heading", "odometer"])
+def test_no_clock_is_estimated_live(section: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"{section}.time_offset: is found from a whole recording"):
+        conversion(tmp_path, **{section: {"time_offset": "estimate"}})
 
 
 def test_fixes_as_configured(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -62,6 +63,20 @@ def test_late_fixes_are_named(velocity: bool, by: float) -> None:
     assert isinstance(finding.size, float)
     assert finding.size == pytest.approx(by, rel=0.2)
     assert f"clock_offset_s: {-finding.size:.3g}" in finding.remedy
+
+
+@pytest.mark.parametrize("velocity", [False, True])
+def test_fixes_that_are_later_and_later_are_named_with_the_drift(velocity: bool) -> None:
+    recording = drive(velocity)
+    gnss = recording.gnss
+    assert gnss is not None
+    middle, drift = float(np.mean(gnss.time)), 2000e-6
+    (finding,) = of(replace(recording, gnss=replace(gnss, time=gnss.time + drift * (gnss.time - middle))))
+    told = re.search(r"(growing|shrinking) by (\d+) ppm \(std (\d+) ppm\)", finding.text)
+    assert told
+    assert float(told[2]) == pytest.approx(2000.0, abs=3.0 * float(told[3]))
+    assert "time_offset: estimate" in finding.remedy
+    assert re.search(r"clock_drift_ppm: -\d+ and clock_reference_s", finding.remedy)
 
 
 @pytest.mark.parametrize("seed", [1, 3, 5])

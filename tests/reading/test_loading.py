@@ -87,6 +87,23 @@ def test_clock_offsets_are_added(tmp_path: Path) -> None:
     assert recording.gnss.time[0] == pytest.approx(BEGIN + 0.5 - 0.125)
 
 
+def test_clocks_that_drift_and_leap(tmp_path: Path) -> None:
+    values = write_recording(tmp_path)
+    known = load(write_config(tmp_path, values))
+    drifts = {"clock_drift_ppm": 500.0, "clock_reference_s": BEGIN}
+    values["imus"][1] |= {"clock_offset_s": 0.25, **drifts}
+    leap = known.gnss.time[3]
+    values["gnss"] |= {"clock_offset_s": -0.125, **drifts, "clock_leaps_s": [[float(leap), -0.25]]}
+    recording = load(write_config(tmp_path, values))
+    stamps = known.imus[1].time
+    np.testing.assert_allclose(recording.imus[1].time, stamps + 0.25 + 500e-6 * (stamps - BEGIN), atol=1e-9)
+    # a gyro shows rates: over longer intervals it turned more
+    np.testing.assert_allclose(recording.imus[1].dvel, 1.0005 * known.imus[1].dvel, atol=1e-12)
+    stamps = known.gnss.time
+    expected = stamps - 0.125 + 500e-6 * (stamps - BEGIN) - 0.25 * (stamps >= leap)
+    np.testing.assert_allclose(recording.gnss.time, expected, atol=1e-9)
+
+
 def test_with_a_rate_the_stamps_do_not_matter(tmp_path: Path) -> None:
     values = write_recording(tmp_path)
     rows = still_imu()

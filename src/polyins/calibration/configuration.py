@@ -9,11 +9,17 @@ from typing import Any
 
 from polyins.calibration.estimates import ASIDE, Calibration, Estimate
 from polyins.config import Config
+from polyins.config.clock import ClockSettings
 from polyins.config.yaml_document import write_yaml
 from polyins.model.recording import Offset
+from polyins.model.rig import PPM
 
 Values = dict[str, Any]
 DIGITS = 7
+STREAMS = ("gnss", "height", "heading", "odometer", "reference")
+"""sections beside those of IMUs whose clocks may have been found"""
+NAMES = {"gnss": "GNSS"}
+"""of streams that are not called as their section is"""
 WEAKEST = {"mount_deg": 1.5}
 """A component whose std is larger than this does not take the place of what was configured."""
 
@@ -30,13 +36,15 @@ def calibrated(values: Values, config: Config, calibration: Calibration, folder:
     for raw, entry in zip(new["imus"], config.imus, strict=True):
         for estimate in calibration.imus.get(entry.name, ()):
             _put(raw, estimate)
-        _settle(raw, entry.clock_offset_s, found.get(entry.name))
+        _settle(raw, entry, found.get(entry.name))
     (new.get("imu_defaults") or {}).pop("time_offset", None)
-    if config.gnss is not None:
-        _settle(new["gnss"], config.gnss.clock_offset_s, found.get("GNSS"))
+    for section in STREAMS:
+        other = getattr(config, section)
+        if other is not None:
+            _settle(new[section], other, found.get(NAMES.get(section, section)))
     if folder is not None and "dataset" not in new:
-        for section in (*new["imus"], new.get("gnss"), new.get("reference")):
-            if section:
+        for section in (*new["imus"], *map(new.get, STREAMS)):
+            if section and section.get("file"):
                 section["file"] = str(folder / Path(section["file"]).expanduser())
     return _heading(calibration) + write_yaml(new)
 
@@ -67,10 +75,17 @@ def _plain(value: tuple[float, ...] | str) -> Any:
     return rounded if len(rounded) > 1 else rounded[0]
 
 
-def _settle(raw: Values, configured: float, found: Offset | None) -> None:
-    if found is not None:
-        raw["clock_offset_s"] = round(raw.get("clock_offset_s", configured) + found.offset_s, DIGITS)
-        raw.pop("time_offset", None)
+def _settle(raw: Values, entry: ClockSettings, found: Offset | None) -> None:
+    """Write what was found of a clock; of a drift that is far from sure, too, for the offset holds with it."""
+    if found is None:
+        return
+    known = entry.settled(found.clock)
+    raw.pop("time_offset", None)
+    del known["time_offset"]
+    leaps = [[round(value, DIGITS) for value in leap] for leap in known.pop("clock_leaps_s", ())]
+    raw |= {key: round(value, DIGITS) for key, value in known.items()}
+    if leaps:
+        raw["clock_leaps_s"] = leaps
 
 
 def _heading(calibration: Calibration) -> str:
@@ -79,7 +94,10 @@ def _heading(calibration: Calibration) -> str:
     for name, estimates in calibration.imus.items():
         parts = [f"{one.key} {_numbers(one.std)}" for one in estimates if one.std and not one.key.startswith(ASIDE)]
         lines.append(f"#   {name}: " + "; ".join(parts))
-    lines += [f"#   clock of {one.name}: {one.std_s:.4f} s" for one in calibration.clock_offsets]
+    lines += [
+        f"#   clock of {one.name}: {one.std_s:.4f} s, {one.drift_std / PPM:.1f} ppm"
+        for one in calibration.clock_offsets
+    ]
     return "\n".join(lines) + "\n"
 
 

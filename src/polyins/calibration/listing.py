@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from polyins.calibration.estimates import ASIDE, Agreement, Calibration, Estimate
-from polyins.model.rig import DEG
+from polyins.model.recording import Offset
+from polyins.model.rig import DEG, PPM
 from polyins.version import __version__
 
 COLUMNS = ["setting", "estimate", "std", "configured"]
@@ -26,10 +27,7 @@ def document(calibration: Calibration) -> dict[str, Any]:
         "forward_from": calibration.forward_from or None,
         "poses": calibration.poses,
         "agreement": {name: _agreement(one) for name, one in calibration.agreement.items()},
-        "clock_offsets": {
-            one.name: {"offset_s": one.offset_s, "std_s": one.std_s, "correlation": one.correlation}
-            for one in calibration.clock_offsets
-        },
+        "clock_offsets": {one.name: clock_document(one) for one in calibration.clock_offsets},
         "warnings": list(calibration.warnings),
     }
 
@@ -37,10 +35,27 @@ def document(calibration: Calibration) -> dict[str, Any]:
 def rows(calibration: Calibration) -> list[list[str]]:
     """Return a table's rows, each as long as `COLUMNS`."""
     settings = [row for name, estimates in calibration.imus.items() for one in estimates for row in _rows(name, one)]
-    return settings + [
-        [f"{one.name}  clock offset, s", f"{one.offset_s:.4f}", f"{one.std_s:.4f}", "-"]
-        for one in calibration.clock_offsets
-    ]
+    return settings + [row for one in calibration.clock_offsets for row in _clock_rows(one)]
+
+
+def clock_document(one: Offset) -> dict[str, Any]:
+    """Return what was found of a clock as JSON has it."""
+    return {
+        "offset_s": one.offset_s,
+        "std_s": one.std_s,
+        "correlation": one.correlation,
+        "drift_ppm": one.drift / PPM,
+        "drift_std_ppm": one.drift_std / PPM,
+        "reference_s": one.reference_s,
+        "leaps": [{"stamp_s": at, "added_s": size, "std_s": std} for at, size, std in one.leaps],
+    }
+
+
+def _clock_rows(one: Offset) -> list[list[str]]:
+    offset = [f"{one.name}  clock offset, s", f"{one.offset_s:.4f}", f"{one.std_s:.4f}", "-"]
+    drift = [f"{one.name}  clock drift, ppm", f"{one.drift / PPM:.1f}", f"{one.drift_std / PPM:.1f}", "-"]
+    leaps = [[f"{one.name}  leap at {at:.3f} s", f"{size:.4f}", f"{std:.4f}", "-"] for at, size, std in one.leaps]
+    return [offset, drift, *leaps]
 
 
 def agreed(calibration: Calibration) -> str:

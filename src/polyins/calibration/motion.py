@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from polyins.model.recording import Array, ImuStream
 from polyins.prepare.timesync import GAP
+
+
+class Signals(Protocol):
+    """What two streams are compared by."""
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last instant, s."""
+
+    @property
+    def least(self) -> float:
+        """Rms of what happens in a window, below which it is no motion."""
+
+    def between(self, begin: Array, end: Array) -> Array:
+        """Return what happened from `begin` to `end`, shape (M, K)."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +34,8 @@ class RunningSums:
     """s, shape (T + 1,)"""
     sums: Array
     """shape (T + 1, K)"""
+    least: float = 0.003
+    """rms of what happens in a window, below which it is no motion; of angles, rad"""
 
     @property
     def span(self) -> tuple[float, float]:

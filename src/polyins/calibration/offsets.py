@@ -3,19 +3,21 @@
 Each stream is reduced to a few signals that need no knowledge of its mounting: the three rates of a body, the spin and
 the yaw of a wheel, the distances between GNSS fixes. Two streams on the right offset explain each other linearly. How
 well is the mutual information of Gaussian signals, -1/2 sum ln(1 - rho_i^2) with their canonical correlations rho_i:
-its product with the common time is the gain of log likelihood, which is compared over all offsets.
+its product with the common time is the gain of log likelihood, which is compared over all offsets. About the best one
+the signals are linear in offset, drift and leaps, and least squares find these.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from polyins.calibration.motion import RunningSums, motion
-from polyins.calibration.regression import BLOCKS, blocks, huber, jackknife_covariance
+from polyins.calibration.clock_line import Pair
+from polyins.calibration.motion import RunningSums, Signals, motion
+from polyins.calibration.regression import huber
 from polyins.calibration.wheels import spin_axis, turns
 from polyins.errors import InputError
 from polyins.model.geodesy import displacement
@@ -28,7 +30,12 @@ COARSE_STEP = 0.05  # s
 FINE_STEP = 0.1  # s, from one window to the next
 FINE_REACH = 0.1  # s, to both sides
 FINE_TRIALS = 41
-SHORTEST_COMMON = 20.0  # s
+SHORTEST_COMMON = 20.0
+"""windows"""
+SHORT_WINDOW = 0.2
+"""s: of bodies that are one rigid thing, all of whose turns are shared"""
+ATTITUDE_WINDOW = 0.5
+"""s: over less, what a coarse attitude changes by is its resolution"""
 SMALLEST_SHARE = 0.2  # of the shorter stream
 NOISE = 0.01
 """of the variance, added in the coarse search: on its grid no offset fits better than so, and none wins by rounding"""
@@ -38,19 +45,6 @@ RIVAL = 0.7
 """A second peak with this part of the first one's information makes the offset ambiguous."""
 LOBE = 3.0  # s: nearer than this it is the same peak
 LEAST_CORRELATION = 0.8
-LEAST_TURN = 0.003  # rad, rms over a window: less is no motion
-LEAST_DISTANCE = 0.2  # m
-
-
-class Signals(Protocol):
-    """What two streams are compared by."""
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """First and last instant, s."""
-
-    def between(self, begin: Array, end: Array) -> Array:
-        """Return what happened from `begin` to `end`, shape (M, K)."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +55,8 @@ class Positions:
     """s, shape (M,)"""
     position: Array
     """m north, east, shape (M, 2)"""
+    least: float = 0.2
+    """m"""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -78,6 +74,8 @@ class Mean:
     """The mean of several streams on one clock: of the wheels on both sides it is the middle of the axle's."""
 
     parts: Sequence[RunningSums]
+    least: float = 0.003
+    """rad"""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -98,8 +96,10 @@ def imu_offsets(imus: Sequence[Imu], streams: Sequence[ImuStream], base: int) ->
     """
     hub = _hub(imus, base)
     signals = [_imu_signals(imu, stream) for imu, stream in zip(imus, streams, strict=True)]
+    bodies = [imu.wheel is None for imu in imus]
+    windows = [SHORT_WINDOW if body and bodies[hub] else WINDOW for body in bodies]
     to_hub = [
-        none(imu.name) if i == hub else find_offset(imu.name, signals[i], imus[hub].name, signals[hub])
+        none(imu.name) if i == hub else find_offset(imu.name, signals[i], imus[hub].name, signals[hub], windows[i])
         for i, imu in enumerate(imus)
     ]
     onward = reversed_offset(to_hub[base], imus[hub].name)
@@ -120,30 +120,45 @@ def gnss_offset(
         raise InputError(f"{name}: its clock's offset is found by wheel speed; expected an IMU on a wheel")
     rolling = Mean([_imu_signals(imus[i], streams[i]) for i in straight or wheels])
     position = displacement(gnss.position, gnss.position[0], geodetic)
-    path = Positions(gnss.time, position[:, :2])
-    return find_offset(name, path, "the wheels", rolling)
+    return find_offset(name, Positions(gnss.time, position[:, :2]), "the wheels", rolling)
 
 
-def find_offset(name: str, signals: Signals, base_name: str, base: Signals) -> Offset:
+def body_offset(
+    name: str, signals: Signals, imus: Sequence[Imu], streams: Sequence[ImuStream], window: float
+) -> Offset:
+    """Find what to add to the stamps of a heading, an attitude or a speed, by the rates or forces of a body.
+
+    Raises InputError without an IMU on a body, and as `imu_offsets`.
+    """
+    moved = [motion(stream) for imu, stream in zip(imus, streams, strict=True) if imu.wheel is None]
+    if not moved:
+        raise InputError(f"{name}: its clock's offset is found by an IMU on the body; expected one")
+    felt = moved[0].force if name == "odometer" else moved[0].rate
+    return find_offset(name, signals, "the IMUs", moved[0].running(felt), window)
+
+
+def find_offset(name: str, signals: Signals, base_name: str, base: Signals, window: float = WINDOW) -> Offset:
     """Find what to add to the stamps of `signals` to put them on the clock of `base`.
 
-    All offsets are searched that leave 20 s, and a fifth of the shorter stream, in common; the best one is refined to
-    a fraction of a sample. Its std is that of estimates which leave out an eighth of the time each. Raises InputError
-    for no common motion and for an ambiguous offset.
+    All offsets are searched that leave twenty windows, of `window` s, and a fifth of the shorter stream, in common; the
+    best one is refined to a fraction of a sample, with a drift and leaps. Their std is that of estimates which leave
+    out an eighth of the time each. Raises InputError for no common motion and for an ambiguous offset.
     """
     pair = f"{name} and {base_name}"
-    coarse = _search(signals, base, pair)
-    for _ in range(3):
-        offset, std, correlation, at_edge = _refine(signals, base, coarse)
-        if not at_edge:
-            break
-        coarse = offset
+    found = [_refined(signals, base, coarse, window) for coarse in candidates(signals, base, pair, window)]
+    offset, gain, correlation = found[0]
+    for rival in found[1:]:
+        if rival.gain > RIVAL * gain:
+            raise ambiguous(pair, offset, rival.offset)
     if correlation < LEAST_CORRELATION:
         raise InputError(
             f"time_offset: {pair} share no common motion (correlation {correlation:.2f} at best); expected streams of "
             "one drive"
         )
-    return Offset(name, offset, std, correlation)
+    line = Pair(signals, base, window).line(offset)
+    clock, std = line.clock, np.sqrt(np.diag(line.covariance)).tolist()
+    leaps = tuple((at, size, sure) for (at, size), sure in zip(clock.leaps, std[2:], strict=True))
+    return Offset(name, clock.offset, std[0], correlation, clock.drift, std[1], clock.reference, leaps)
 
 
 def _hub(imus: Sequence[Imu], base: int) -> int:
@@ -165,13 +180,31 @@ def none(name: str) -> Offset:
 
 def chained(one: Offset, onward: Offset) -> Offset:
     """Return the offset of `one` to the clock to which `onward` leads from that of its base."""
-    std = float(np.hypot(one.std_s, onward.std_s))
-    return Offset(one.name, one.offset_s + onward.offset_s, std, min(one.correlation, onward.correlation))
+    clock = one.clock.then(onward.clock)
+    at = clock.reference
+    away = one.clock.common(at) - onward.reference_s if onward.drift else 0.0
+    apart = at - one.reference_s if one.drift else 0.0
+    std = float(np.linalg.norm([one.std_s, one.drift_std * apart, onward.std_s, onward.drift_std * away]))
+    sure = [sure for *_, sure in (*one.leaps, *onward.leaps)]
+    known = [value for value in (one.correlation, onward.correlation) if value is not None]
+    correlation = min(known) if len(known) == 2 else None
+    return Offset(
+        one.name,
+        clock.offset,
+        std,
+        correlation,
+        clock.drift,
+        float(np.hypot(one.drift_std, onward.drift_std)),
+        clock.reference,
+        tuple((*leap, max(sure)) for leap in clock.leaps),
+    )
 
 
 def reversed_offset(one: Offset, name: str) -> Offset:
     """Return what to add to the other clock instead, whose stream has that name."""
-    return replace(one, name=name, offset_s=-one.offset_s)
+    clock = one.clock.inverse
+    leaps = tuple((*leap, std) for leap, (*_, std) in zip(clock.leaps, one.leaps, strict=True))
+    return replace(one, name=name, offset_s=clock.offset, drift=clock.drift, reference_s=clock.reference, leaps=leaps)
 
 
 def _imu_signals(imu: Imu, stream: ImuStream) -> RunningSums:
@@ -182,23 +215,41 @@ def _imu_signals(imu: Imu, stream: ImuStream) -> RunningSums:
     return RunningSums(spin_and_yaw.edges, spin_and_yaw.sums[:, :1]) if imu.wheel.steering else spin_and_yaw
 
 
-def _windows(signals: Signals, step: float) -> tuple[Array, Array]:
+def _windows(signals: Signals, step: float, window: float) -> tuple[Array, Array]:
     """Return the middles of windows every `step` seconds, shape (M,), and what happened in them, shape (M, K)."""
     begin, end = signals.span
-    middle = np.arange(begin + 0.5 * WINDOW, end - 0.5 * WINDOW, step)
-    return middle, signals.between(middle - 0.5 * WINDOW, middle + 0.5 * WINDOW)
+    middle = np.arange(begin + 0.5 * window, end - 0.5 * window, step)
+    return middle, signals.between(middle - 0.5 * window, middle + 0.5 * window)
 
 
-def _search(signals: Signals, base: Signals, pair: str) -> float:
-    """Return the offset with the most information, to a step of the grid; raise InputError if there are rivals."""
-    time, one = _windows(signals, COARSE_STEP)
-    base_time, two = _windows(base, COARSE_STEP)
-    least = SHORTEST_COMMON + SMALLEST_SHARE * (min(len(one), len(two)) * COARSE_STEP - SHORTEST_COMMON)
-    if min(len(one), len(two)) * COARSE_STEP < SHORTEST_COMMON:
-        raise InputError(f"time_offset: {pair}: one has less than {SHORTEST_COMMON:g} s of data; expected more")
+class _Refined(NamedTuple):
+    """An offset near which two streams fit best."""
+
+    offset: float
+    """s"""
+    gain: float
+    """information times windows in common"""
+    correlation: float
+
+
+def ambiguous(pair: str, one: float, other: float) -> InputError:
+    """Return the error that two offsets, s, fit almost equally well."""
+    return InputError(
+        f"time_offset: ambiguous offset of {pair}: {one:.2f} s and {other:.2f} s fit almost equally well; expected a "
+        "drive whose speed or turns do not repeat, or none in common"
+    )
+
+
+def candidates(signals: Signals, base: Signals, pair: str, window: float = WINDOW) -> list[float]:
+    """Return the offset with the most information, to a step of the grid, and the best of its rivals, if there are."""
+    time, one = _windows(signals, COARSE_STEP, window)
+    base_time, two = _windows(base, COARSE_STEP, window)
+    shortest = SHORTEST_COMMON * window
+    least = shortest + SMALLEST_SHARE * (min(len(one), len(two)) * COARSE_STEP - shortest)
+    if min(len(one), len(two)) * COARSE_STEP < shortest:
+        raise InputError(f"time_offset: {pair}: one has less than {shortest:g} s of data; expected more")
     for windows, source in ((one, signals), (two, base)):
-        limit = LEAST_DISTANCE if isinstance(source, Positions) else LEAST_TURN
-        if np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=0)).max() < limit:
+        if np.sqrt(np.mean((windows - windows.mean(axis=0)) ** 2, axis=0)).max() < source.least:
             raise InputError(f"time_offset: {pair} share no common motion: one hardly moves; expected a drive")
     lags, gain = _gains(one, two, least / COARSE_STEP)
     best = int(np.argmax(gain))
@@ -206,12 +257,8 @@ def _search(signals: Signals, base: Signals, pair: str) -> float:
     rivals = peaks[np.abs(lags[peaks] - lags[best]) * COARSE_STEP > LOBE]
     offset = base_time[0] - time[0] + lags * COARSE_STEP
     if len(rivals) and gain[rivals].max() > RIVAL * gain[best]:
-        other = offset[rivals[np.argmax(gain[rivals])]]
-        raise InputError(
-            f"time_offset: ambiguous offset of {pair}: {offset[best]:.2f} s and {other:.2f} s fit almost equally well; "
-            "expected a drive whose speed or turns do not repeat, or none in common"
-        )
-    return float(offset[best])
+        return [float(offset[best]), float(offset[rivals[np.argmax(gain[rivals])]])]
+    return [float(offset[best])]
 
 
 def _gains(one: Array, two: Array, least: float) -> tuple[Array, Array]:
@@ -263,24 +310,24 @@ def _information(aa: Array, bb: Array, ab: Array, noise: float) -> Array:
     return np.asarray(-0.5 * np.log(np.maximum(np.linalg.det(left), np.finfo(float).tiny)))
 
 
-def _refine(signals: Signals, base: Signals, coarse: float) -> tuple[float, float, float, bool]:
-    """Return the offset with the most information near `coarse`, its std, the correlation, and if it lies at an edge.
-
-    Windows that do not fit count less (Huber).
-    """
+def _refined(signals: Signals, base: Signals, coarse: float, window: float) -> _Refined:
+    """Return the offset with the most information near `coarse`; windows that do not fit count less (Huber)."""
     begin, end = signals.span
     first, last = base.span
-    reach = 0.5 * WINDOW + FINE_REACH + COARSE_STEP
-    middle = np.arange(max(begin, first - coarse) + reach, min(end, last - coarse) - reach, FINE_STEP)
-    windows = (middle - 0.5 * WINDOW, middle + 0.5 * WINDOW)
-    one = _standard(signals.between(*windows))
-    weights = _weights(one, base.between(windows[0] + coarse, windows[1] + coarse))
-    trials = coarse + np.linspace(-FINE_REACH, FINE_REACH, FINE_TRIALS)
-    gains = np.array([_left_out(one, _standard(base.between(*(w + t for w in windows))), weights) for t in trials])
-    peaks = np.array([_peak(trials, gain) for gain in gains.T])
-    correlation = float(np.sqrt(-np.expm1(-2.0 * gains[:, 0].max())))
-    std = float(np.sqrt(jackknife_covariance(peaks[1:, None])[0, 0]))
-    return float(peaks[0]), std, correlation, bool(abs(peaks[0] - coarse) > 0.9 * FINE_REACH)
+    half = 0.5 * window
+    reach = half + FINE_REACH + COARSE_STEP
+    for _ in range(3):
+        middle = np.arange(max(begin, first - coarse) + reach, min(end, last - coarse) - reach, FINE_STEP)
+        windows = (middle - half, middle + half)
+        one = _standard(signals.between(*windows))
+        weights = _weights(one, base.between(windows[0] + coarse, windows[1] + coarse))
+        trials = coarse + np.linspace(-FINE_REACH, FINE_REACH, FINE_TRIALS)
+        gains = np.array([_gain(one, _standard(base.between(*(w + t for w in windows))), weights) for t in trials])
+        peak, before = _peak(trials, gains), coarse
+        coarse = peak
+        if abs(peak - before) <= 0.9 * FINE_REACH:
+            break
+    return _Refined(peak, len(middle) * float(gains.max()), float(np.sqrt(-np.expm1(-2.0 * gains.max()))))
 
 
 def _weights(one: Array, two: Array) -> Array:
@@ -290,17 +337,11 @@ def _weights(one: Array, two: Array) -> Array:
     return np.asarray(np.prod([huber(column) for column in residuals.T], axis=0))
 
 
-def _left_out(one: Array, two: Array, weights: Array) -> Array:
-    """Return the mutual information over all windows, then over those without each block, shape (1 + BLOCKS,)."""
-    both = np.column_stack([np.ones(len(one)), one, two])
-    block = blocks(len(one))
-    moments = np.array([(both[block == b].T * weights[block == b]) @ both[block == b] for b in range(BLOCKS)])
-    whole = moments.sum(axis=0)
-    used = np.concatenate([whole[None], whole - moments])
-    means = used / used[:, :1, :1]
-    covariance = means[:, 1:, 1:] - means[:, 1:, :1] @ means[:, :1, 1:]
+def _gain(one: Array, two: Array, weights: Array) -> float:
+    """Return the mutual information over all windows."""
+    covariance = np.cov(np.column_stack([one, two]).T, aweights=weights, ddof=0)
     k = one.shape[1]
-    return _information(covariance[:, :k, :k], covariance[:, k:, k:], covariance[:, :k, k:], IDLE)
+    return float(_information(covariance[:k, :k], covariance[k:, k:], covariance[:k, k:], IDLE))
 
 
 def _peak(at: Array, values: Array) -> float:

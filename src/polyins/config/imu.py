@@ -8,13 +8,13 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from polyins.config.clock import ClockSettings
 from polyins.config.columns import ImuColumns
 from polyins.config.fields import (
     IDENTITY,
     ORIGIN,
     Matrix,
     NotNegative,
-    Number,
     PerAxis,
     Positive,
     Section,
@@ -138,7 +138,7 @@ class InitialStd(Section):
     """ppm; the larger, the faster the estimate leaves initial_errors under acceleration"""
 
 
-class ImuSettings(Section):
+class ImuSettings(ClockSettings):
     """What can be said of one IMU, or under `imu_defaults` of all."""
 
     format: Literal["auto", "xsens-dot", "kf-gins", "wheel-ins", "table"] = "auto"
@@ -147,10 +147,6 @@ class ImuSettings(Section):
     """of a table; without it the table has the columns that polyins writes"""
     rate_hz: Positive | None = None
     """take row number / rate_hz as the time and ignore the stamps"""
-    clock_offset_s: Number = 0.0
-    """added to the stamps, s; the larger, the later the samples count"""
-    time_offset: Literal["estimate"] | None = None
-    """estimate: what is left of the clock's offset is found from the motion that this IMU shares with the others"""
     gyro_range_deg_s: Positive | None = None
     """full scale of the gyro, deg/s: what reaches it is left out; the larger, the less is; without it that of the
     format, where it is known"""

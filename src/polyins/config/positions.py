@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from polyins.config.clock import ClockSettings
 from polyins.config.columns import TrackColumns
 from polyins.config.fields import ORIGIN, Number, Positive, Section, Spread, Triple, number
 
@@ -21,7 +22,7 @@ class GeodeticPoint(Section):
     """m above the ellipsoid"""
 
 
-class GnssEntry(Section):
+class GnssEntry(ClockSettings):
     """The positions that aid the filter."""
 
     file: str = ""
@@ -32,10 +33,6 @@ class GnssEntry(Section):
     """of the file; auto: found from its content"""
     columns: TrackColumns | None = None
     """of a table; without it the table has the columns that polyins writes"""
-    clock_offset_s: Number = 0.0
-    """added to the stamps, s; the larger, the later the positions count"""
-    time_offset: Literal["estimate"] | None = None
-    """estimate: what is left of the clock's offset is found from the motion that the IMUs show too"""
     antenna_position_m: Triple = ORIGIN
     """of the antenna from the array's origin: forward, right, down, m"""
     position_std_m: Spread | None = None
@@ -50,7 +47,7 @@ class GnssEntry(Section):
     """turn latitude and longitude into metres on the local plane that touches here"""
 
 
-class ReferenceEntry(Section):
+class ReferenceEntry(ClockSettings):
     """What the solution is judged by."""
 
     file: str
@@ -61,8 +58,6 @@ class ReferenceEntry(Section):
     """of the file; auto: found from its content"""
     columns: TrackColumns | None = None
     """of a table; without it the table has the columns that polyins writes"""
-    clock_offset_s: Number = 0.0
-    """added to the stamps, s; the larger, the later the positions count"""
     position_lag_s: Number = 0.0
     """position and velocity belong to an instant that much later than the attitude of the same row, s"""
     point_m: Triple = ORIGIN

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
+from polyins.config.clock import ClockSettings
 from polyins.config.columns import TimeColumn
-from polyins.config.fields import ORIGIN, Column, NotNegative, Number, Positive, Section, Triple
+from polyins.config.fields import ORIGIN, Column, NotNegative, Positive, Section, Triple
 
 
 class SensorColumns(Section):
@@ -22,7 +23,7 @@ class SensorColumns(Section):
     """standard deviation of the value, in its unit"""
 
 
-class SensorEntry(Section):
+class SensorEntry(ClockSettings):
     """What all of them have in common."""
 
     file: str = ""
@@ -31,8 +32,6 @@ class SensorEntry(Section):
     """which stream of a log; may be left out where there is only one of the kind"""
     columns: SensorColumns | None = None
     """of the table; without it time_s and height_m, heading_deg or speed_m_s"""
-    clock_offset_s: Number = 0.0
-    """added to the stamps, s; the larger, the later the values count"""
     rate_hz: Positive | None = None
     """thin the values to this rate; the larger, the more of them are used, as if their errors were independent"""
     position_m: Triple = ORIGIN

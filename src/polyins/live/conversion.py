@@ -18,7 +18,7 @@ class Conversion:
         self.matrices = {
             entry.name: tuple(map(_unless_identity, imu_stream.to_array_axes(entry))) for entry in config.imus
         }
-        self.offsets = {entry.name: entry.clock_offset_s for entry in config.imus}
+        self.clocks = {entry.name: entry.clock for entry in config.imus}
         self.gnss = config.gnss
         self.sensors = dict(sensor_stream.entries(config))
         self.geodetic = geodetic
@@ -32,8 +32,7 @@ class Conversion:
     def _imu(self, sample: ImuSample) -> ImuSample:
         if sample.imu not in self.matrices:
             raise RefusedError("unknown IMU")
-        gyro, accel = self.matrices[sample.imu]
-        time = sample.time + self.offsets[sample.imu]
+        (gyro, accel), time = self.matrices[sample.imu], self.clocks[sample.imu].common(sample.time)
         return ImuSample(sample.imu, time, _mapped(gyro, sample.dtheta), _mapped(accel, sample.dvel))
 
     def _sensor(self, sample: SensorSample) -> SensorSample:
@@ -44,7 +43,7 @@ class Conversion:
         std = sample.std
         if given is not None:
             std = sensor_stream.with_constraint(entry, np.array([given]))[0]
-        return sample._replace(time=sample.time + entry.clock_offset_s, std=std)
+        return sample._replace(time=entry.clock.common(sample.time), std=std)
 
     def _fix(self, fix: GnssFix) -> GnssFix:
         entry = self.gnss
@@ -53,7 +52,7 @@ class Conversion:
         std = fix.position_std if entry.position_std_m is None else np.array(entry.position_std_m)
         if std is None:
             raise RefusedError("GNSS without std")
-        time = fix.time + entry.clock_offset_s
+        time = entry.clock.common(fix.time)
         position = self._placed(self._above_ellipsoid(fix), fix.geodetic)
         has_velocity = fix.velocity is not None and fix.velocity_std is not None
         velocity = (fix.velocity, fix.velocity_std) if has_velocity else (None, None)

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.model.clock import Clock
 from polyins.model.findings import Finding
 from polyins.model.rig import DEG, Rig, Vector, zero_vector
 
@@ -228,11 +229,25 @@ class Offset:
     """What was found to add to the stamps of one stream to put them on the clock of the others."""
 
     name: str
-    """of the IMU, or GNSS"""
+    """of the IMU, GNSS, or the kind of another stream"""
     offset_s: float
+    """at the stamp `reference_s`"""
     std_s: float
-    correlation: float
-    """of the motions that were compared, at that offset"""
+    correlation: float | None
+    """of the motions that were compared, at that offset; None: a trajectory was fitted instead"""
+    drift: float = 0.0
+    """relative; above zero where the clock is slow"""
+    drift_std: float = 0.0
+    reference_s: float = 0.0
+    """stamp at which the drift adds nothing"""
+    leaps: tuple[tuple[float, float, float], ...] = ()
+    """of the clock: stamp from which on, what is added to later stamps, s, and its std, s"""
+
+    @property
+    def clock(self) -> Clock:
+        """What brings the stamps to the clock of the others."""
+        leaps = tuple((at, size) for at, size, _ in self.leaps)
+        return Clock(self.offset_s, self.drift, self.reference_s, leaps)
 
 
 @dataclass(frozen=True)

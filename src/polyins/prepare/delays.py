@@ -8,7 +8,7 @@ turned meanwhile. Neither needs a filter, which would take part of a delay for e
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from polyins.errors import InputError
 from polyins.model.findings import Finding, Severity
 from polyins.model.geodesy import displacement
 from polyins.model.recording import GnssStream, Recording
-from polyins.model.rig import Rig
+from polyins.model.rig import PPM, Rig
 from polyins.prepare.blocks import Blocks
 
 Array = NDArray[np.float64]
@@ -48,6 +48,10 @@ FARTHEST_FIXES = 25.0
 """s: delays of fixes that are looked for; leap seconds are 18"""
 ROUGH, STEP = 0.5, 0.1
 """s, of the search: everywhere, and near what it finds"""
+WAY_S = 1.0
+"""s of the ways whose courses tell a drift"""
+SIGMAS = 4.0
+"""robust standard deviations, from which a turn is left out of a trend"""
 SURE_OF_FIXES = 4.0
 """standard deviations by which a delay of fixes is not zero; they hold what is not known of the antenna"""
 LEAST_FIX_DELAY = 0.05
@@ -180,11 +184,14 @@ class _Turns:
         return _Turns(self.begin[rows], self.end[rows], self.turned[rows], self.std[rows], self.speed[rows])
 
     def by_gyros(self, time: Array, yaw: Array, delays: Array) -> Array:
-        """Return what the gyros turned, at each delay, (D, K); `yaw` is what they turned up to `time`, rad."""
-        ends = np.stack([self.begin - delays[:, None], self.end - delays[:, None]])
+        """Return what the gyros turned at delays, (D, 1) or of each turn (D, K); shape (D, K).
+
+        `yaw` is what they turned up to `time`, rad.
+        """
+        ends = np.stack([self.begin - delays, self.end - delays])
         return np.asarray(np.diff(np.interp(ends, time, yaw), axis=0)[0])
 
-    def ahead(self, time: Array, yaw: Array, delay: float) -> Array:
+    def ahead(self, time: Array, yaw: Array, delay: float | Array) -> Array:
         """Return by how much more the course turns for each metre that the antenna is ahead of the axle, rad/m (K,).
 
         There the velocity makes an angle of rate over speed with the vehicle.
@@ -208,19 +215,95 @@ def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Find
     found = list(_told(blocks.time, yaw, parts))
     # what no part is sure of all of them may be
     off = _late(found) or _late(list(_told(blocks.time, yaw, [turns])))
+    trend = _surest_trend(blocks.time, yaw, gnss, geodetic, _typical(off or found)) if len(found) > 1 else None
+    if not off and trend is not None:
+        off = found
     if not off:
         return
-    size = _typical(off)
-    if abs(size) > HOPELESS and 1 < len(off) == len(found) and all(abs(one.delay - size) < STEP for one in found):
+    size = _typical(off) if trend is None else trend.delay
+    expected = [size if trend is None else trend.at(0.5 * (one.begin + one.end)) for one in found]
+    agree = all(abs(one.delay - there) < STEP for one, there in zip(found, expected, strict=True))
+    if abs(size) > HOPELESS and 1 < len(off) == len(found) and agree:
         late = "late" if size > 0.0 else "early"
+        more, keys = _drifting(trend, size)
+        digits = 1 if trend is None else 3
         raise InputError(
-            f"GNSS: its course turns as the gyros do, {abs(size):.1f} s {late} all along; expected one clock:"
-            f" gnss.clock_offset_s: {-size:.1f} corrects that"
+            f"GNSS: its course turns as the gyros do, {abs(size):.1f} s {late} all along{more}; expected one clock:"
+            f" gnss.clock_offset_s: {-size:.{digits}f}{keys} corrects that, or gnss.time_offset: estimate"
         )
     std = float(np.median(gnss.position_std[:, :2]))
-    moves = abs(size) * max(one.speed for one in off) / std
+    largest = max(abs(size), *map(abs, expected)) if trend is not None else abs(size)
+    moves = largest * max(one.speed for one in off) / std
     severity: Severity = "serious" if moves > USELESS else "doubt" if moves > DOUBTFUL else "note"
-    yield _finding("GNSS position", off, size, severity)
+    yield _finding("GNSS position", off, size, severity, trend)
+
+
+@dataclass(frozen=True)
+class _Trend:
+    """A delay that grows."""
+
+    middle: float
+    """s, where it is `delay`"""
+    delay: float
+    drift: float
+    """s per second"""
+    drift_std: float
+
+    def at(self, time: float) -> float:
+        return self.delay + self.drift * (time - self.middle)
+
+
+def _surest_trend(time: Array, yaw: Array, gnss: GnssStream, geodetic: bool, delay: float) -> _Trend | None:
+    """Return by how much a delay grows, if it surely does, by velocities or by ways of a second, which is surer.
+
+    `delay`: on the whole, s. A way has the mean course of its time, so the gyros' yaw is averaged likewise.
+    """
+    every = max(1, round(WAY_S / float(np.median(np.diff(gnss.time)))))
+    ways = replace(gnss.at(slice(None, None, every)), velocity=None, velocity_std=None)
+    half = 0.5 * float(np.median(np.diff(ways.time)))
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (yaw[1:] + yaw[:-1]) * np.diff(time))])
+    mean = (np.interp(time + half, time, area) - np.interp(time - half, time, area)) / (2.0 * half)
+    kinds = [(mean, ways)] + ([] if gnss.velocity is None else [(yaw, gnss)])
+    turned = [(about, _turns(fixes, geodetic)) for about, fixes in kinds]
+    found = [_trend(time, about, turns, delay) for about, turns in turned if len(turns.begin) >= LEAST_TURNS]
+    surest = min(found, key=lambda one: one.drift_std, default=None)
+    if surest is None or abs(surest.drift) < SURE_OF_FIXES * surest.drift_std:
+        return None
+    return surest if abs(surest.drift) * (gnss.time[-1] - gnss.time[0]) > LEAST_FIX_DELAY else None
+
+
+def _trend(time: Array, yaw: Array, turns: _Turns, delay: float) -> _Trend:
+    """Return by how much a delay grows, from what it is on the whole, s.
+
+    What is not known of the place of the antenna is the same all along and spoils no drift.
+    """
+    middle, drift = float(0.5 * (turns.begin[0] + turns.end[-1])), 0.0
+    off, own = 0.5 * (turns.begin + turns.end) - middle, turns.centred(turns.turned)
+    used = np.ones(len(off), dtype=bool)
+    for _ in range(STEPS + 1):
+        delays = delay + drift * off
+        before, at, after = (turns.by_gyros(time, yaw, (delays + more)[None])[0] for more in (-STEP, 0.0, STEP))
+        slope = (after - before) / (2.0 * STEP)
+        columns = (slope, slope * off, turns.ahead(time, yaw, delays))
+        design = np.column_stack([turns.centred(column) for column in columns])
+        left = own - turns.centred(at)
+        size = np.median(np.abs(left[used])) / 0.6745
+        used = np.abs(left) < SIGMAS * size
+        variance = float(np.mean(left[used] ** 2))
+        normal = design[used].T @ design[used] + np.diag([1e-12, 1e-12, variance / AHEAD_STD**2])
+        solved = np.linalg.solve(normal, design[used].T @ left[used])
+        delay, drift = delay + float(solved[0]), drift + float(solved[1])
+    std = float(np.sqrt(variance * np.linalg.inv(normal)[1, 1]))
+    return _Trend(middle, delay, drift, std)
+
+
+def _drifting(trend: _Trend | None, size: float) -> tuple[str, str]:
+    """Return what to say of a drift, and the keys that correct it."""
+    if trend is None:
+        return "", ""
+    grows = "growing" if trend.drift * size > 0.0 else "shrinking"
+    text = f", {grows} by {abs(trend.drift) / PPM:.0f} ppm (std {trend.drift_std / PPM:.0f} ppm)"
+    return text, f", clock_drift_ppm: {-trend.drift / PPM:.0f} and clock_reference_s: {trend.middle:.0f}"
 
 
 def _told(time: Array, yaw: Array, parts: Sequence[_Turns]) -> Iterator[_Delay]:
@@ -260,7 +343,9 @@ def _best(time: Array, yaw: Array, turns: _Turns) -> tuple[float, float] | None:
     `yaw` is what they turned up to `time`, rad.
     """
     own = turns.centred(turns.turned)
-    first, last = max(-FARTHEST_FIXES, turns.end[-1] - time[-1]), min(FARTHEST_FIXES, turns.begin[0] - time[0])
+    # where the gyros begin or end with the fixes no delay at all has neighbours on both sides too
+    first = max(-FARTHEST_FIXES, turns.end[-1] - time[-1] - 2.0 * ROUGH)
+    last = min(FARTHEST_FIXES, turns.begin[0] - time[0] + 2.0 * ROUGH)
     rough = ROUGH * np.arange(np.ceil(first / ROUGH), np.floor(last / ROUGH) + 1.0)
     if len(rough) < 3 or np.std(turns.turned) < LEAST_TURN:
         return None
@@ -299,7 +384,7 @@ def _more(left: Array, slope: Array, ahead: Array) -> tuple[float, float]:
 
 def _likes(time: Array, yaw: Array, turns: _Turns, own: Array, delays: Array) -> tuple[Array, Array]:
     """Return the correlation of turns at each delay, (D,), and what the gyros turned, (D, K)."""
-    shifted = turns.centred(turns.by_gyros(time, yaw, delays))
+    shifted = turns.centred(turns.by_gyros(time, yaw, delays[:, None]))
     size = np.linalg.norm(shifted, axis=1) * np.linalg.norm(own)
     return shifted @ own / np.maximum(size, 1e-12), shifted
 
@@ -317,17 +402,21 @@ def _typical(found: Sequence[_Delay]) -> float:
     return float(np.median([one.delay for one in found]))
 
 
-def _finding(stream: str, off: Sequence[_Delay], size: float, severity: Severity) -> Finding:
+def _finding(
+    stream: str, off: Sequence[_Delay], size: float, severity: Severity, trend: _Trend | None = None
+) -> Finding:
     begin, end = off[0].begin, off[-1].end
     late = "late" if size > 0.0 else "early"
+    more, keys = _drifting(trend, size)
     return Finding(
         "delay",
-        f"{stream}: {abs(size):.3g} s {late} from {begin:.0f} to {end:.0f} s, as its turns tell",
+        f"{stream}: {abs(size):.3g} s {late} from {begin:.0f} to {end:.0f} s{more}, as its turns tell",
         severity,
         stream=stream,
         from_s=begin,
         to_s=end,
         size=size,
         expected=0.0,
-        remedy=f"clock_offset_s: {-size:.3g} corrects that",
+        remedy=f"clock_offset_s: {-size:.3g}{keys} corrects that"
+        + (", time_offset: estimate finds it more closely" if trend is not None else ""),
     )

@@ -66,7 +66,7 @@ class ImuFile:
         found: list[Finding] = []
         sample = _nothing(self.entry.name)
         for fresh, findings in self._rows():
-            time = fresh.time + self.entry.clock_offset_s
+            time = self.entry.clock.common(fresh.time)
             found += findings
             if not len(time):
                 continue

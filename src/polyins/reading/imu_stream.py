@@ -88,12 +88,18 @@ def measured(rows: ImuRows, entry: ImuEntry, *, alone: bool, first_row: int = 0)
 def in_array_axes(rows: ImuRows, entry: ImuEntry) -> ImuStream:
     """Return rows as increments in array axes, on a wheel in the module's, on the recording's clock."""
     gyro, accel = to_array_axes(entry)
-    return ImuStream(entry.name, rows.time + entry.clock_offset_s, mapped(gyro, rows.dtheta), mapped(accel, rows.dvel))
+    dtheta, dvel = mapped(gyro, rows.dtheta), mapped(accel, rows.dvel)
+    return ImuStream(entry.name, entry.clock.common(rows.time), dtheta, dvel)
 
 
 def to_array_axes(entry: ImuEntry) -> tuple[Array, Array]:
-    """Return the matrices that correct increments of gyro and accelerometers and turn them, shape (3, 3) each."""
-    rotation = sensor_rotation(entry)
+    """Return the matrices that correct increments of gyro and accelerometers and turn them, shape (3, 3) each.
+
+    They lead to intervals of the common clock, too: what becomes of a rate over an interval by a clock that is slow is
+    too little.
+    """
+    rotation, drift = sensor_rotation(entry), entry.clock.drift
+    rotation = (1.0 + drift) * rotation if drift else rotation
     return _corrected_then(rotation, entry.gyro_matrix), _corrected_then(rotation, entry.accel_matrix)
 
 
@@ -170,7 +176,7 @@ def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:
 
 
 def mapped(matrix: Array, increments: Array) -> Array:
-    """Return matrix @ increment of each row, shape (T, 3)."""
+    """Return matrix @ increment of each row, shape (T, 3), to the same bits one by one and all at once."""
     if np.array_equal(matrix, np.eye(3)):
         return increments
     # a matrix product would wake every BLAS thread for a 3 x 3 matrix

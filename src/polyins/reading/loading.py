@@ -15,7 +15,7 @@ from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
 from polyins.errors import InputError
 from polyins.model.findings import Finding
-from polyins.model.recording import FilterOptions, Heights, ImuStream, Offset, Recording
+from polyins.model.recording import FilterOptions, Heights, ImuStream, Recording
 from polyins.model.rig import Imu, Rig
 from polyins.reading import catalogue, clocks, usable
 from polyins.reading.imu_stream import as_mounted, read_imu
@@ -118,19 +118,22 @@ def build(config: Config, document: Document, mounts_known: bool = True) -> Reco
     if mounts_known:
         streams_of = [one.stream for one in measuring]
         kept, fallen = usable.upright([one.entry for one in measuring], alive, streams_of, document)
-    known, config = config, config.model_copy(update={"imus": tuple(measuring[i].entry for i in kept)})
-    imus, streams = tuple(measuring[i].imu for i in kept), tuple(measuring[i].stream for i in kept)
-    config, streams, offsets = clocks.on_one_clock(config, document, imus, streams)
-    notes += [clocks.described(offset) for offset in offsets]
+    going = [measuring[i] for i in kept]
+    imus = tuple(one.imu for one in going)
+    known, config = config, config.model_copy(update={"imus": tuple(one.entry for one in going)})
+    config, streams, offsets = clocks.on_one_clock(config, document, going)
+    known = _with_clocks(known, config)
     kept, apart = usable.overlapping(config.imus, [(stream.time[0], stream.time[-1]) for stream in streams])
     config = config.model_copy(update={"imus": tuple(config.imus[i] for i in kept)})
     imus, streams = tuple(imus[i] for i in kept), tuple(streams[i] for i in kept)
     findings = (*dead, *fallen, *apart, *(finding for one in measuring for finding in one.findings))
+    findings += tuple(clocks.described(one, float(streams[0].time[0])) for one in offsets)
+    findings += tuple(finding for one in offsets for finding in clocks.leaps_of(one))
     spans = {stream.name: (stream.time[0], stream.time[-1]) for stream in streams}
     span = stream_checks.check_common_span(spans, wait=any(imu.wheel for imu in imus))
     recording = assemble(config, document, imus, streams, span, mounts_known)
     warnings = (*notes, *recording.warnings)
-    text = in_force(known.model_copy(update={"gnss": config.gnss}), offsets)
+    text = in_force(known)
     return replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
 
 
@@ -190,11 +193,8 @@ def without_data(config: Config, document: Document) -> tuple[Recording, tuple[s
     Raises InputError for settings that need data beforehand.
     """
     notes = wheel_checks.check_settings(config, document)
-    for index, entry in enumerate(config.imus):
-        if entry.time_offset:
-            raise document.error(
-                ["imus", index, "time_offset"], "is found from a whole recording; expected clock_offset_s"
-            )
+    for keys in clocks.to_be_found(config.model_copy(update={"reference": None})):
+        raise document.error(keys, "is found from a whole recording; expected clock_offset_s")
     if config.start.heading_from == "reference":
         raise document.error(
             ["start", "heading_from"], "is reference, which live data have not; expected heading_deg or gnss-course"
@@ -237,18 +237,16 @@ def _rig(config: Config, document: Document, imus: tuple[Imu, ...]) -> Rig:
     return rig
 
 
-def in_force(config: Config, offsets: tuple[Offset, ...] = ()) -> str:
-    """Return the configuration as YAML, with the clock offsets that were found in the place of those to be found."""
-    found = {offset.name: offset.offset_s for offset in offsets}
-    imus = tuple(
-        imu.model_copy(update={"clock_offset_s": imu.clock_offset_s + found.get(imu.name, 0.0), "time_offset": None})
-        if imu.time_offset
-        else imu
-        for imu in config.imus
-    )
-    gnss = config.gnss and config.gnss.model_copy(update={"time_offset": None})
-    known = config.model_copy(update={"imus": imus, "gnss": gnss})
-    return write_yaml(known.model_dump(mode="json", exclude=NOT_IN_FORCE))
+def in_force(config: Config) -> str:
+    """Return the configuration as YAML."""
+    return write_yaml(config.model_dump(mode="json", exclude=NOT_IN_FORCE))
+
+
+def _with_clocks(config: Config, found: Config) -> Config:
+    """Return a configuration with what was found of the clocks; IMUs that are left out have none."""
+    by_name = {entry.name: entry for entry in found.imus}
+    imus = tuple(by_name.get(entry.name, entry.model_copy(update=entry.settled())) for entry in config.imus)
+    return found.model_copy(update={"imus": imus})
 
 
 def one_by_kind(notes: list[str]) -> list[str]:

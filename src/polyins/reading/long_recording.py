@@ -23,7 +23,7 @@ from polyins.model.recording import ImuStream, Recording, usual_interval
 from polyins.navigate.restart import Pause, borders, common_pauses, hopeless, part_of
 from polyins.prepare import timesync
 from polyins.prepare.timesync import Aligned, Whole
-from polyins.reading import loading, usable
+from polyins.reading import clocks, loading, usable
 from polyins.reading.imu_file import ImuFile, StreamExtent, StretchReader, can_be_read_in_order
 from polyins.reading.imu_stream import as_mounted
 
@@ -259,9 +259,8 @@ def _can_be_streamed(config: Config, document: Document) -> bool:
     for index, entry in enumerate(config.imus):
         with document.at(["imus", index, "file"]):
             find_named(entry.file)
-    return not (config.gnss and config.gnss.time_offset) and all(
-        entry.time_offset is None
-        and entry.gyro_range_deg_s is None
+    return not clocks.to_be_found(config) and all(
+        entry.gyro_range_deg_s is None
         and (entry.rate_hz or entry.columns is None or entry.columns.time is not None)
         and can_be_read_in_order(entry)
         for entry in config.imus

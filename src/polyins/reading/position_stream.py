@@ -40,7 +40,7 @@ def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) 
     else:
         track = _file_track(entry, kind)
     warnings = list(stream_checks.check_track(track, section))
-    track = replace(track, time=track.time + entry.clock_offset_s)
+    track = replace(track, time=entry.clock.common(track.time))
     raised = _above_ellipsoid(track, entry, section, document)
     if raised is not track and entry.geoid_height_m is None:
         by = float(np.median(raised.position[:, 2] - track.position[:, 2]))

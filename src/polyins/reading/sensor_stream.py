@@ -65,17 +65,18 @@ def read_sensors(config: Config, document: Document, span: Span) -> tuple[tuple[
     for kind, entry in entries(config):
         if not entry.file and kind == "odometer" and constraint_of(config) is not None:
             continue
-        stream, texts = _read(kind, entry, document, span)
+        stream, texts = read_sensor(kind, entry, document, span)
         streams.append(stream)
         warnings += texts
     return tuple(streams), warnings
 
 
-def _read(kind: str, entry: SensorEntry, document: Document, span: Span) -> tuple[AidingStream, list[str]]:
+def read_sensor(kind: str, entry: SensorEntry, document: Document, span: Span) -> tuple[AidingStream, list[str]]:
+    """Read one, as `read_sensors` does."""
     with document.at([kind, "file"]):
         find_named(entry.file)
     rows = _rows(kind, entry, document)
-    source, time = rows.source, rows.time + entry.clock_offset_s
+    source, time = rows.source, entry.clock.common(rows.time)
     if not len(time):
         raise InputError(f"{source.path}: no rows; expected those of {kind}")
     stream_checks.check_finite(source, {"time": time, kind: rows.value})

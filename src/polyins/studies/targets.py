@@ -20,6 +20,13 @@ TARGETS = (
     ),
     Target("array", "polyins.studies.array:reproduce", seconds=(10, 240)),
     Target("allan", "polyins.studies.allan:reproduce", datasets=("mimu4444", "logs"), seconds=(20, 90)),
+    Target(
+        "clocks",
+        "polyins.studies.clocks:reproduce",
+        datasets=("quadrotor",),
+        seconds=(30, 250),
+        print_tables="polyins.studies.clocks:print_tables",
+    ),
     Target("consistency", "polyins.studies.consistency:reproduce"),
     Target(
         "starts",

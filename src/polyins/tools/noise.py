@@ -39,7 +39,7 @@ def _on_one_clock(settings: Settings, read: list[ReadImu]) -> tuple[tuple[ImuStr
     if not any(entry.time_offset for entry in settings.config.imus):
         return streams, ()
     try:
-        return on_one_clock(settings.config, settings.document, tuple(one.imu for one in read), streams)[1], ()
+        return on_one_clock(settings.config, settings.document, read).streams, ()
     except InputError as error:
         text = f"clocks are taken as they are, so that what IMUs have in common is not seen: {error}"
         return streams, (Finding("clock", text),)
