@@ -94,7 +94,8 @@ def _against(own: Array, others: Array) -> _Mount | None:
     own, others = _weighted(own), _weighted(others)
     if np.sqrt(np.mean(np.sum(others[:-1, :3] ** 2, axis=1))) < LEAST_TURN:
         return None
-    named = [_axes(own[:, of], others[:, of]) for of in (slice(0, 3), slice(3, 6))]
+    accel = _axes(own[:, 3:], others[:, 3:])
+    named = [_axes(own[:, :3], others[:, :3], alone=accel == AS_STATED), accel]
     vectors, wanted = np.vstack(np.hsplit(own, 2)), np.vstack(np.hsplit(others, 2))
     if named[0] != named[1] or np.linalg.det(TURNS[named[0]]) < 0.0:
         return _Mount(np.eye(3), 180.0, 0.0, named[0], named[1])
@@ -117,13 +118,19 @@ def _weighted(means: Array) -> Array:
     return np.vstack([centred, np.concatenate([np.zeros(3), mean[3:] / FLOOR[1]])])
 
 
-def _axes(own: Array, others: Array) -> int:
-    """Return which axes one sensor has, if other ones than stated explain all; without motion a sign is not seen."""
+def _axes(own: Array, others: Array, *, alone: bool = False) -> int:
+    """Return which axes one sensor has, if other ones than stated explain all; without motion a sign is not seen.
+
+    `alone`: the other sensor has those stated, so that columns are swapped or reversed: those mirror, no sensor turns.
+    """
     left = np.einsum("kij,wj->kwi", TURNS, own) - others
     cost = np.maximum(np.sum(left**2, axis=(1, 2)), len(own))
     if cost.min() > EXPLAINED_BY_AXES * cost[AS_STATED]:
         return AS_STATED
-    return int(np.argmax(np.where(cost <= ALIKE * cost.min(), UNCHANGED - cost / cost.max(), -np.inf)))
+    alike = cost <= ALIKE * cost.min()
+    mirrored = alike & (np.linalg.det(TURNS) < 0.0)
+    alike = mirrored if alone and mirrored.any() else alike
+    return int(np.argmax(np.where(alike, UNCHANGED - cost / cost.max(), -np.inf)))
 
 
 def _turn(rotation: Array) -> tuple[Array, float]:

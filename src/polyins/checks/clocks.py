@@ -12,16 +12,18 @@ from polyins.checks.evidence import Evidence
 from polyins.config.yaml_document import Setting
 from polyins.errors import ImplausibleError
 from polyins.model.findings import Finding
+from polyins.model.recording import Array
 from polyins.prepare import timesync
 from polyins.prepare.blocks import Blocks
 from polyins.prepare.data_findings import of_data
 from polyins.prepare.delays import (
-    FARTHEST_FIXES,
+    AS_GOOD,
+    COURSE_LIKE,
     HARMFUL,
     LEAST_IMU_DELAY,
     LEAST_TURNS,
     SURE,
-    best_delay,
+    Turns,
     lag,
     turns_of_course,
 )
@@ -38,6 +40,8 @@ LEAP_S = {
 """whole seconds between clocks"""
 NEAR_S = 0.4
 """of whole seconds"""
+LEAST_LEAP = 2.0
+"""s: shorter delays are those of receivers"""
 FIXES, DELAY = "GNSS position", "delay"
 
 
@@ -54,8 +58,9 @@ def find(evidence: Evidence) -> Iterator[Diagnosis]:
     if not recording.rig.has_wheels:
         blocks = Blocks.of(aligned)
         found = (*found, *_of_pair(evidence, blocks))
-        if not any(one.kind == DELAY and one.stream == FIXES for one in found):
-            found = (*found, *_leap(evidence, blocks))
+        late = next((one for one in found if one.kind == DELAY and one.stream == FIXES), None)
+        leap = _leap(evidence, blocks, late)
+        found = tuple(one for one in found if one is not late or leap is None) + (() if leap is None else (leap,))
     for one in found:
         yield _diagnosis(one, evidence)
 
@@ -81,27 +86,37 @@ def _of_pair(evidence: Evidence, blocks: Blocks) -> Iterator[Finding]:
     )
 
 
-def _leap(evidence: Evidence, blocks: Blocks) -> Iterator[Finding]:
-    """Say whether fixes fit with whole seconds added that are farther off than delays are looked for."""
+def _leap(evidence: Evidence, blocks: Blocks, late: Finding | None) -> Finding | None:
+    """Return that fixes fit as well with the whole seconds between two clocks as with the delay that was found.
+
+    Bends that come again fit many delays; of those the seconds that clocks differ by are the likeliest.
+    """
     gnss = evidence.recording.gnss
-    if gnss is None:
-        return
+    found = 0.0 if late is None else float(late.size or 0.0)
+    if gnss is None or (abs(found) < LEAST_LEAP and late is not None):
+        return None
     turns = turns_of_course(gnss, evidence.recording.geodetic)
     steps = np.diff(blocks.time, prepend=blocks.time[0] - blocks.interval)
     yaw = np.cumsum(blocks.middle[:, 2] * steps)
-    for seconds in LEAP_S:
-        if seconds < FARTHEST_FIXES:
-            continue
-        for size in (seconds, -seconds):
-            moved = replace(turns, begin=turns.begin - size, end=turns.end - size)
-            inside = (moved.begin > blocks.time[0]) & (moved.end < blocks.time[-1])
-            if inside.sum() < LEAST_TURNS:
-                continue
-            rows = np.flatnonzero(inside)
-            told = best_delay(blocks.time, yaw, moved.at(slice(int(rows[0]), int(rows[-1]) + 1)))
-            if told is not None and abs(told[0]) < NEAR_S:
-                yield Finding(DELAY, "", "serious", stream=FIXES, size=size + told[0], expected=0.0)
-                return
+    known = _likeness(turns, blocks.time, yaw, found)
+    likes = {size: _likeness(turns, blocks.time, yaw, size) for seconds in LEAP_S for size in (seconds, -seconds)}
+    best = max(likes, key=lambda size: likes[size])
+    if likes[best] < COURSE_LIKE or 1.0 - likes[best] > AS_GOOD * (1.0 - known):
+        return None
+    return Finding(DELAY, "", "serious", stream=FIXES, size=best, expected=0.0)
+
+
+def _likeness(turns: Turns, time: Array, yaw: Array, delay: float) -> float:
+    """Return the correlation of the turns of course and gyros at about that delay."""
+    inside = (turns.begin - delay > time[0]) & (turns.end - delay < time[-1])
+    if inside.sum() < LEAST_TURNS:
+        return 0.0
+    rows = np.flatnonzero(inside)
+    some = turns.at(slice(int(rows[0]), int(rows[-1]) + 1))
+    own = some.centred(some.turned)
+    shifted = some.centred(some.by_gyros(time, yaw, delay + np.arange(-NEAR_S, NEAR_S + 0.05, 0.1)))
+    size = np.linalg.norm(shifted, axis=1) * np.linalg.norm(own)
+    return float(np.max(shifted @ own / np.maximum(size, 1e-12)))
 
 
 def _diagnosis(finding: Finding, evidence: Evidence) -> Diagnosis:

@@ -27,7 +27,9 @@ def find(evidence: Evidence) -> Iterator[Diagnosis]:
     inside = (gnss.time > reference.time[0]) & (gnss.time < reference.time[-1])
     if inside.sum() < LEAST_FIXES:
         return
-    off = np.interp(gnss.time[inside], reference.time, reference.position[:, 2]) - gnss.position[inside, 2]
+    # both describe points of their own, down from the array's origin
+    lower = float(reference.lever_arm[2] - recording.rig.antenna[2])
+    off = np.interp(gnss.time[inside], reference.time, reference.position[:, 2]) + lower - gnss.position[inside, 2]
     size, spread = float(np.median(off)), float(np.quantile(off, 0.9) - np.quantile(off, 0.1))
     if abs(size) < max(LEAST_M, spread / SPREAD):
         return

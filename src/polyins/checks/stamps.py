@@ -19,7 +19,7 @@ EVEN = 2.0
 """times the std of the intervals, by which stamps of an even clock leave a line at most; of uneven samples they walk"""
 TOO_FAST_RAD = 1.0
 """that it turns from one sample to the next, in 5 % of them: the error of taking the rates as constant is its cube"""
-SMOOTH = 0.5
+SMOOTH = 0.8
 """correlation of turn rates from sample to sample, below which the motion is not followed"""
 SMOOTH_RAD_S = 0.3
 """rms of the rates, of which that is asked"""

@@ -18,7 +18,7 @@ from polyins.errors import InputError
 from polyins.model.findings import Finding
 from polyins.model.recording import Array, Recording
 
-LONGEST_S = 300.0
+LONGEST_S = 150.0
 """of a recording, that tell"""
 LEAST_FIXES = 30
 STEP_M = 0.2
@@ -97,6 +97,8 @@ def lever_arm(recording: Recording) -> _Arm | None:
         normal = design.T @ (weight[:, None] * design) + 1e-9 * np.eye(3)
         step = np.linalg.solve(normal, design.T @ (weight * left))
         std = _std(design, weight, left - design @ step)
+        if np.linalg.norm(np.where(std < UNSURE_M, step, 0.0)) < LEAST_M:
+            break
         arm = arm - step
     return _Arm(value, std, best / first)
 

@@ -228,7 +228,7 @@ def _of_fixes(blocks: Blocks, gnss: GnssStream, recording: Recording) -> Iterato
 
 def _told(time: Array, yaw: Array, parts: Sequence[Turns]) -> Iterator[_Delay]:
     for part in parts:
-        told = best_delay(time, yaw, part) if len(part.begin) >= LEAST_TURNS else None
+        told = _best(time, yaw, part) if len(part.begin) >= LEAST_TURNS else None
         if told is not None:
             speed = float(np.sqrt(np.mean(part.speed**2)))
             yield _Delay(float(part.begin[0]), float(part.end[-1]), *told, speed)
@@ -257,7 +257,7 @@ def turns_of_course(gnss: GnssStream, geodetic: bool) -> Turns:
     return Turns(time[k], time[k + 1], np.angle(along[k + 1] / along[k]), std, both)
 
 
-def best_delay(time: Array, yaw: Array, turns: Turns) -> tuple[float, float] | None:
+def _best(time: Array, yaw: Array, turns: Turns) -> tuple[float, float] | None:
     """Return at which delay the gyros turned as the course did, s, and its std, s; None: not told.
 
     `yaw` is what they turned up to `time`, rad.

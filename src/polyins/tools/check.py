@@ -59,7 +59,8 @@ class Checked:
     def add(self, found: Sequence[Finding]) -> None:
         """Take findings that are not there yet; of what a cause explains nothing is said again."""
         for one in found:
-            if one.kind in SEVERAL or not any(_same(one, known) for known in self.findings):
+            alike = [known for known in self.findings if _same(one, known)]
+            if not alike or (one.kind in SEVERAL and one not in alike):
                 self.findings.append(one)
 
     def as_json(self) -> dict[str, Any]:
