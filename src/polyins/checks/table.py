@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 from polyins.checks import (
     array_mounts,
+    beginning,
     clipping,
     clocks,
+    fix_scatter,
     heights,
     level,
     stamps,
@@ -45,7 +47,8 @@ STAGES: tuple[tuple[Check, ...], ...] = (
     ),
     (Check(level.upside, False), Check(level.handedness, True)),
     (Check(array_mounts.find, False),),
-    (Check(clocks.find, False), Check(heights.find, True)),
+    (Check(clocks.find, False), Check(heights.find, True), Check(fix_scatter.find, True)),
+    (Check(beginning.find, False),),
     (Check(still.breaks, False), Check(still.rest, False), Check(trial.find, False)),
 )
 """all of one stage are asked together"""

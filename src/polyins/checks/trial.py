@@ -1,7 +1,8 @@
-"""What only a trial run tells: the lever arm of the antenna, and whether fixes are as good as they state.
+"""What only a trial run tells: the lever arm and the clock of a receiver, and whether fixes are as good as they state.
 
-An innovation of a fix changes by J when the antenna is taken elsewhere; runs with it a bit forward, right and down give
-J, and the arm that makes the innovations least is the likeliest: their likelihood is that of the fixes.
+Innovations change by J when the antenna is taken elsewhere, or the fixes earlier; runs with it a bit forward, right and
+down, and with other stamps, give J, and what makes the innovations least is the likeliest: their likelihood is that of
+the fixes. Arm and clock are estimated together, for on a straight drive one looks like the other.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polyins.checks.diagnosis import Diagnosis
 from polyins.checks.evidence import Evidence
@@ -21,16 +23,20 @@ from polyins.model.recording import Array, Recording
 LONGEST_S = 150.0
 """of a recording, that tell"""
 LEAST_FIXES = 30
-STEP_M = 0.2
+STEP = np.array([0.2, 0.2, 0.2, 0.02])
+"""m forward, right, down; s"""
+LATE = 3
+"""place of the delay"""
 STEPS = 3
 PARTS = 8
 """of the fixes, which are compared"""
 LARGE = 3.0
 """standard deviations, from which an innovation counts by its size, not by its square"""
-LEAST_M = 0.25
+LEAST = np.array([0.25, 0.25, 0.25, 0.06])
+"""m, s: less is not said"""
 SURE = 6.0
-UNSURE_M = 0.3
-"""std, from which a component of the arm is not told"""
+UNSURE = np.array([0.3, 0.3, 0.3, 0.1])
+"""std, m, s, from which a component is not told"""
 BETTER = 0.9
 """times the squares of the innovations with the arm as stated, that those with another one have at most"""
 NOISY = 3.0
@@ -39,28 +45,40 @@ FIXES = "GNSS position"
 
 
 @dataclass(frozen=True)
-class _Arm:
-    """An estimated lever arm."""
+class _Likeliest:
+    """How the receiver is mounted and how late it is: forward, right, down, m, and s."""
 
     value: Array
     std: Array
     better: float
-    """squares of the innovations with it, over those with the arm as stated"""
+    """squares of the innovations with it, over those with what is stated"""
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which components are told."""
+        return self.std < UNSURE
 
 
 def find(evidence: Evidence) -> Iterator[Diagnosis]:
     """Say what trial runs tell of a receiver; of a rig with wheels nothing."""
-    recording = evidence.recording
-    if recording.gnss is None or recording.rig.has_wheels or evidence.config.gnss is None:
+    recording, gnss = evidence.recording, evidence.config.gnss
+    if recording.gnss is None or recording.rig.has_wheels or gnss is None:
         return
     recording = _short(recording)
     try:
         yield from _noise(recording)
-        arm = lever_arm(recording)
+        found = likeliest(recording)
     except InputError:
         return
-    if arm is not None:
-        yield from _told(recording.rig.antenna, arm)
+    if found is None or found.better > BETTER:
+        return
+    stated = np.append(recording.rig.antenna, 0.0)
+    off = np.where(found.known, found.value - stated, 0.0)
+    sure = np.abs(off) > SURE * found.std
+    if abs(off[LATE]) > LEAST[LATE] and sure[LATE]:
+        yield _late(float(off[LATE]), gnss.clock_offset_s)
+    elif np.linalg.norm(off[:LATE]) > LEAST[0] and sure[:LATE].any():
+        yield _elsewhere(stated[:LATE], off[:LATE])
 
 
 def _short(recording: Recording) -> Recording:
@@ -71,46 +89,46 @@ def _short(recording: Recording) -> Recording:
     return replace(recording, start=replace(recording.start, end_time=end), outages=())
 
 
-def lever_arm(recording: Recording) -> _Arm | None:
-    """Return the likeliest lever arm, forward, right, down, m, or None where too few fixes tell."""
-    stated = recording.rig.antenna
-    arm, first, best = stated.copy(), np.inf, np.inf
+def likeliest(recording: Recording) -> _Likeliest | None:
+    """Return the likeliest lever arm and delay, or None where too few fixes tell."""
+    now = np.append(recording.rig.antenna, 0.0)
+    first = best = np.inf
+    value, std = now.copy(), np.full(4, np.inf)
     design: Array | None = None
-    std = np.full(3, np.inf)
     for _ in range(STEPS):
-        left = _innovations(recording, arm)
+        left = _innovations(recording, now)
         if len(left) < 3 * LEAST_FIXES:
             return None
         if design is None:
-            moved = [_innovations(recording, arm + STEP_M * axis) for axis in np.eye(3)]
+            moved = [_innovations(recording, now + step) for step in np.diag(STEP)]
             if any(len(one) != len(left) for one in moved):
                 return None
-            design = np.column_stack([(one - left) / STEP_M for one in moved])
+            design = np.column_stack([(one - left) / step for one, step in zip(moved, STEP, strict=True)])
         if len(left) != len(design):
-            return None
+            break
         cost = _cost(left)
         first = cost if first == np.inf else first
         if cost >= best:
             break
-        best, value = cost, arm.copy()
+        best, value = cost, now.copy()
         weight = np.minimum(1.0, LARGE / np.maximum(np.abs(left), 1e-9))
-        normal = design.T @ (weight[:, None] * design) + 1e-9 * np.eye(3)
+        normal = design.T @ (weight[:, None] * design) + 1e-9 * np.eye(4)
         step = np.linalg.solve(normal, design.T @ (weight * left))
         std = _std(design, weight, left - design @ step)
-        if np.linalg.norm(np.where(std < UNSURE_M, step, 0.0)) < LEAST_M:
+        if np.all(np.abs(np.where(std < UNSURE, step, 0.0)) < 0.5 * LEAST):
             break
-        arm = arm - step
-    return _Arm(value, std, best / first)
+        now = now - step
+    return _Likeliest(value, std, best / first)
 
 
 def _std(design: Array, weight: Array, left: Array) -> Array:
-    """Return how far the arm that parts of the fixes tell differs from that of all, (3,), by leaving out each in turn.
+    """Return how far what parts of the fixes tell differs from what all tell, (4,), by leaving out each in turn.
 
     Innovations hang together for longer than one fix, so that their number says too much.
     """
     parts = [np.einsum("mi,m,mj->ij", d, w, d) for d, w in zip(_parts(design), _parts(weight), strict=True)]
     sides = [d.T @ (w * one) for d, w, one in zip(_parts(design), _parts(weight), _parts(left), strict=True)]
-    whole, floor = sum(parts), 1e-9 * np.eye(3)
+    whole, floor = sum(parts), 1e-9 * np.eye(4)
     moved = np.array([np.linalg.solve(whole - a + floor, -b) for a, b in zip(parts, sides, strict=True)])
     jackknife = (PARTS - 1) / PARTS * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
     scale = max(1.0, float(np.mean(weight * left**2)))
@@ -127,25 +145,40 @@ def _cost(left: Array) -> float:
     return float(np.sum(np.where(size < LARGE, size**2, 2.0 * LARGE * size - LARGE**2)))
 
 
-def _innovations(recording: Recording, arm: Array) -> Array:
-    """Return the innovations of all fixes with the antenna there, over their std, (3 M,)."""
+def _innovations(recording: Recording, at: Array) -> Array:
+    """Return the innovations of all fixes with that arm and delay, over their std, (3 M,)."""
     from polyins.navigate.batch import run
 
-    measured = run(replace(recording, rig=replace(recording.rig, antenna=arm)).without_gate(), "single").innovations
+    assert recording.gnss is not None
+    rig, gnss = replace(recording.rig, antenna=at[:LATE]), replace(recording.gnss, time=recording.gnss.time - at[LATE])
+    measured = run(replace(recording, rig=rig, gnss=gnss).without_gate(), "single").innovations
     with np.errstate(divide="ignore", invalid="ignore"):
         left = (measured.residual / measured.std).ravel()
     return np.asarray(np.where(np.isfinite(left), left, 0.0))
 
 
-def _told(stated: Array, arm: _Arm) -> Iterator[Diagnosis]:
-    known = arm.std < UNSURE_M
-    off = np.where(known, arm.value - stated, 0.0)
-    if np.linalg.norm(off) < LEAST_M or arm.better > BETTER or not np.any(np.abs(off) > SURE * arm.std):
-        return
+def _late(late: float, offset: float) -> Diagnosis:
+    word = "late" if late > 0.0 else "early"
+    right = round(offset - late, 3)
+    return Diagnosis(
+        Finding(
+            "delay",
+            f"{FIXES}: {abs(late):.3g} s {word}, as trial runs tell",
+            "doubt",
+            stream=FIXES,
+            size=late,
+            expected=0.0,
+            remedy=f"gnss.clock_offset_s: {right:g} corrects that",
+        ),
+        (Setting(("gnss", "clock_offset_s"), right),),
+    )
+
+
+def _elsewhere(stated: Array, off: Array) -> Diagnosis:
     right = [round(float(value), 2) for value in stated + off]
-    reverse = np.linalg.norm((arm.value + stated)[known]) < 0.5 * np.linalg.norm(off)
+    reverse = np.linalg.norm(stated + off + stated) < 0.5 * np.linalg.norm(off)
     said, shown = (", ".join(f"{value:.2f}" for value in one) for one in (stated, right))
-    yield Diagnosis(
+    return Diagnosis(
         Finding(
             "lever arm",
             f"{FIXES}: the antenna is at [{said}] m, trial runs fit best with [{shown}]"

@@ -34,6 +34,13 @@ TARGETS = (
         seconds=(12, 120),
     ),
     Target(
+        "checks",
+        "polyins.studies.data_faults.table:reproduce",
+        datasets=("quadrotor", "wid", "whu-array"),
+        seconds=(60, 280),
+        print_tables="polyins.studies.data_faults.table:print_tables",
+    ),
+    Target(
         "lies",
         "polyins.studies.robustness.lies:reproduce",
         seconds=(10, 30),

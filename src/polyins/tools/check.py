@@ -25,6 +25,8 @@ from polyins.tools.propose.inputs import are_logs
 from polyins.tools.propose.proposal import propose
 
 MOST_ROUNDS = 12
+NO_START = "start"
+"""kind of the finding that a run finds none, which refuses the data"""
 REFUSED = "refused"
 """kind of what no check names by another one"""
 
@@ -97,8 +99,8 @@ def _check_all(checked: Checked) -> None:
     for number in range(MOST_ROUNDS):
         assert checked.document is not None
         evidence, refusals = _read(checked.document)
-        checked.refused |= number == 0 and bool(refusals)
         found = [] if evidence is None else _asked(evidence)
+        checked.refused |= number == 0 and (bool(refusals) or any(one.finding.kind == NO_START for one in found))
         settings = [one for diagnosis in found if checked.new(diagnosis.finding) for one in diagnosis.settings]
         named = {one.finding.kind for one in found}
         checked.add([one.finding for one in found])

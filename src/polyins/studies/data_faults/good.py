@@ -24,7 +24,7 @@ from polyins.studies.rigid_array import base_scenario, group_chips
 from polyins.tools.propose.proposal import propose
 
 LENGTH_S, DRIVE_S = 120.0, 180.0
-FLIGHTS = ("Horizontal/path_2", "Horizontal/path_9", "Horizontal/path_11", "Horizontal/path_23", "RAW_1111")
+FLIGHTS = ("Horizontal/path_2", "Horizontal/path_9", "Horizontal/path_23", "RAW_1111")
 TRIALS = ("06", "08")
 CASES = ("start-traffic-light", "start-rtk-end", "walk", "two-grades", "start-accelerating", "gap-37")
 LOGS = ("dataflash/log0036.bin", "rosbag/husky.bag", "ulog/small.ulg")
