@@ -65,6 +65,11 @@ class Checked:
             if not alike or (one.kind in SEVERAL and one not in alike):
                 self.findings.append(one)
 
+    def set(self, settings: Sequence[Setting]) -> None:
+        """Take settings, each in the place of an earlier one for the same key."""
+        keys = {one.keys for one in settings}
+        self.settings = [*(one for one in self.settings if one.keys not in keys), *settings]
+
     def as_json(self) -> dict[str, Any]:
         """Return it as JSON has it."""
         return {
@@ -87,6 +92,8 @@ def check(inputs: Sequence[Path]) -> Checked:
 
 def _opened(inputs: Sequence[Path]) -> Checked:
     if not are_logs(inputs):
+        if len(inputs) > 1:
+            raise InputError(f"{', '.join(map(str, inputs))}: are {len(inputs)} configurations; expected one")
         settings = read_config(inputs[0])
         return Checked(settings.document, list(notes(settings.warnings)))
     proposal = propose([find(path).resolve() for path in inputs])
@@ -100,7 +107,7 @@ def _check_all(checked: Checked) -> None:
         assert checked.document is not None
         evidence, refusals = _read(checked.document)
         found = [] if evidence is None else _asked(evidence)
-        checked.refused |= number == 0 and (bool(refusals) or any(one.finding.kind == NO_START for one in found))
+        checked.refused |= (number == 0 and bool(refusals)) or any(one.finding.kind == NO_START for one in found)
         settings = [one for diagnosis in found if checked.new(diagnosis.finding) for one in diagnosis.settings]
         named = {one.finding.kind for one in found}
         checked.add([one.finding for one in found])
@@ -109,7 +116,7 @@ def _check_all(checked: Checked) -> None:
             if evidence is not None:
                 checked.add([*evidence.recording.findings, *notes(evidence.recording.warnings)])
             return
-        checked.settings += settings
+        checked.set(settings)
         checked.document = checked.document.changed(settings)
 
 
