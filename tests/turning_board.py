@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.checks import clipping, stamps, stuck, twins, wraps
+from polyins.checks.diagnosis import Diagnosis
 from polyins.checks.evidence import Evidence
 from polyins.config.yaml_document import read_yaml
 from polyins.reading.loading import gather, located
@@ -61,3 +63,15 @@ def turned(bundle: Bundle, index: int, turn: Array) -> Bundle:
     """Return the board with one IMU turned: its axes into those of the board by `turn`, (3, 3)."""
     both = [bundle.vectors(index, names) @ turn for names in (GYRO, ACCEL)]
     return bundle.with_imu(index, **dict(zip([*GYRO, *ACCEL], np.hstack(both).T, strict=True)))
+
+
+def told_of_samples(bundle: Bundle, folder: Path) -> list[Diagnosis]:
+    """Return what all checks of single samples say of a recording."""
+    evidence = evidence_of(bundle, folder)
+    finders = (wraps.find, stuck.find, clipping.find, stamps.jitter, stamps.undersampled, twins.find)
+    return [one for find in finders for one in find(evidence)]
+
+
+def some_rows(bundle: Bundle, rows: slice | NDArray[np.intp]) -> Bundle:
+    """Return the board with some rows of its first IMU."""
+    return bundle.with_imu(0, **{name: values[rows] for name, values in bundle.imus[0].items()})
