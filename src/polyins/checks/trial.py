@@ -18,7 +18,7 @@ from polyins.checks.evidence import Evidence
 from polyins.config.yaml_document import Setting
 from polyins.errors import InputError
 from polyins.model.findings import Finding
-from polyins.model.recording import Array, Recording
+from polyins.model.recording import Array, FilterOptions, Recording
 
 LONGEST_S = 150.0
 """of a recording, that tell"""
@@ -198,7 +198,9 @@ def _noise(recording: Recording) -> Iterator[Diagnosis]:
     """Say that fixes scatter by more than they state."""
     from polyins.navigate.batch import run
 
-    measured = run(recording, "single").innovations
+    # a receiver is judged only where fixes are gated, which configurations of KF-GINS do not say
+    gated = replace(recording, options=replace(recording.options, gate_limit=FilterOptions.gate_limit))
+    measured = run(gated, "single").innovations
     if measured.noise_ratio is None or len(measured.time) < LEAST_FIXES or recording.gnss is None:
         return
     ratio = float(np.sqrt(np.median(measured.noise_ratio)))

@@ -14,7 +14,7 @@ import numpy as np
 from polyins.checks.diagnosis import Diagnosis
 from polyins.checks.evidence import Evidence, ImuEvidence
 from polyins.checks.gravity_turn import turn_of_gravity
-from polyins.checks.stream_checks import GRAVITY_M_S2, RATES_HZ
+from polyins.checks.stream_checks import GRAVITY_M_S2, MAX_TURN_RAD, RATES_HZ
 from polyins.config.yaml_document import Setting
 from polyins.formats.rows import intervals
 from polyins.formats.stamps import SECONDS
@@ -22,7 +22,7 @@ from polyins.model.findings import Finding
 from polyins.model.recording import Array, usual_interval
 from polyins.model.rig import DEG, STANDARD_GRAVITY
 from polyins.prepare.delays import LEAST_TURNS, turns_of_course
-from polyins.prepare.plausible import BODY
+from polyins.prepare.plausible import BODY, WHEEL
 
 FAR = 1.0
 """of the logarithm of a factor, from which the unit is wrong"""
@@ -99,9 +99,11 @@ def _gyro_unit(one: ImuEvidence, evidence: Evidence, course: _Course | None, ste
     rms = float(np.sqrt(np.mean(np.sum(rates**2, axis=1))))
     increments = {"rad", "deg"} if accel == "m/s" else {"rad/s", "deg/s"}
     if not ratios:
-        limit = 10.0 * BODY.rms_rate if one.entry.wheel else BODY.rms_rate
+        limit = WHEEL.rms_rate if one.entry.wheel else BODY.rms_rate
+        most = float(np.linalg.norm(one.rows.dtheta, axis=1).max())
+        too_fast = rms > limit or (most > MAX_TURN_RAD and not one.entry.wheel)
         fit = [unit for unit in increments if unit != now and rms * units[unit] / units[now] < limit]
-        return fit[0] if rms > limit and len(fit) == 1 else now
+        return fit[0] if too_fast and len(fit) == 1 else now
     ratio = float(np.median(ratios))
     if abs(np.log(ratio)) < FAR:
         return now

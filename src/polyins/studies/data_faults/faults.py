@@ -375,6 +375,8 @@ def undersampled(bundle: Bundle, rng: np.random.Generator) -> Injected:
 
 
 BODIES = tuple(name for name in ANY if name not in ("wheelins-parity",))
+ONE_WAY_UP = tuple(name for name in BODIES if name not in STILL)
+"""not those that lie on every side in turn, of which none is down"""
 FAULTS = (
     Fault("deg/s as rad/s", ("units",), degrees_as_radians, (*MOVING, *STILL, "walk")),
     Fault("rad/s as deg/s", ("units",), radians_as_degrees, MOVING),
@@ -382,7 +384,7 @@ FAULTS = (
     Fault("rates as increments", ("units",), rates_as_increments, MOVING),
     Fault("increments as rates", ("units",), increments_as_rates, MOVING),
     Fault("ms or us as s", ("sampling",), milliseconds, ANY),
-    Fault("axes upside down", ("axes",), upside_down, BODIES),
+    Fault("axes upside down", ("axes",), upside_down, ONE_WAY_UP),
     Fault("one IMU turned", ("mount",), turned, (*ARRAYS, "mimu4444")),
     Fault("axes of one gyro", ("mount", "axes"), gyro_axes, (*ARRAYS, "mimu4444")),
     Fault("the same IMU twice", ("twice",), twice, (*ARRAYS, *STILL, "two-grades")),

@@ -74,8 +74,8 @@ def _poses() -> Bundle:
         {"t": time[inside], **dict(zip([*GYRO, *ACCEL], np.hstack([gyro[inside, i], accel[inside, i]]).T, strict=True))}
         for i in range(gyro.shape[1])
     )
-    # the first pose has z up
-    entry: dict[str, Any] = {"axes": ["x", "-y", "-z"], "columns": IMU_COLUMNS, "initial_std": TURN_ON}
+    # as the first pose has it
+    entry: dict[str, Any] = {"axes": ["x", "-z", "y"], "columns": IMU_COLUMNS, "initial_std": TURN_ON}
     imus = [{"name": f"chip{i + 1}", **deepcopy(entry)} for i in range(len(tables))]
     return Bundle("mimu4444", {"imus": imus, "start": {"heading_deg": 0.0}}, tables)
 
