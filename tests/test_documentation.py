@@ -549,6 +549,7 @@ CONFIGURATION: dict[str, type[BaseModel]] = {
     "filter": config.Filter,
     "filter.rolling": config.Rolling,
     "filter.standstill": config.Standstill,
+    "checks": config.Checks,
 }
 SCENARIO: dict[str, type[BaseModel]] = {
     "the whole scenario": scenario.Scenario,

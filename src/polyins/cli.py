@@ -584,6 +584,37 @@ def info(files: tuple[Path, ...], as_json: bool) -> None:
 
 
 @cli.command()
+@click.argument("inputs", metavar="CONFIG|LOG...", type=FILE, nargs=-1, required=True)
+@click.option("--fix", type=FILE, default=None, help="A new file for the configuration in which it is right.")
+@as_json_option
+def check(inputs: tuple[Path, ...], fix: Path | None, as_json: bool) -> None:
+    """Say what is wrong with the data, by what evidence, and how to put it right.
+
+    Exit 2 if a run would refuse them.
+    """
+    from polyins.tools.check import check as check_data
+    from polyins.tools.check import write_fixed
+
+    with progress("checking"):
+        checked = check_data(inputs)
+    if fix is not None:
+        write_fixed(checked, fix)
+    if as_json:
+        _print_json(checked.as_json())
+    else:
+        for finding in checked.findings:
+            click.echo(f"{finding.severity}: {finding.kind}: {finding.sentence}")
+        if not checked.findings:
+            click.echo("nothing found")
+    if fix is not None:
+        for setting in checked.settings:
+            say(f"set {setting.sentence}")
+        say(f"configuration: {fix}")
+    if checked.refused:
+        raise click.exceptions.Exit(2)
+
+
+@cli.command()
 @click.argument("source", metavar="IN", type=FILE)
 @click.argument("target", metavar="OUT", type=FILE)
 @click.option("--stream", default=None, help="Of a log of several: the one that is written.")

@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from written_recordings import as_increments, still_imu
 
-from polyins.checks.stream_checks import check_imu, check_track, off_upright, upright_axes
+from polyins.checks.stream_checks import check_imu, check_track, off_upright, steady_force, upright_axes
 from polyins.errors import InputError
 from polyins.formats.rows import ImuRows, RowSource, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
+from polyins.model.recording import ImuStream
 
 UP = np.array([0.3, -0.5, -9.8])
 
@@ -43,8 +44,23 @@ def test_an_array_that_leans_is_upright(lean_deg: float, toward_deg: float) -> N
     lean, toward = np.radians([lean_deg, toward_deg])
     force = -9.8 * np.array([np.sin(lean) * np.cos(toward), np.sin(lean) * np.sin(toward), np.cos(lean)])
     time = np.arange(100) * 0.01
-    assert off_upright("a", "here", ("x", "y", "z"), time, np.tile(force * 0.01, (100, 1))) == ""
-    assert "Try axes" in off_upright("a", "here", ("x", "y", "z"), time, np.tile(-force * 0.01, (100, 1)))
+    upright, fallen = (ImuStream("a", time, np.zeros((100, 3)), np.tile(f * 0.01, (100, 1))) for f in (force, -force))
+    assert off_upright("here", ("x", "y", "z"), upright) == ""
+    assert "Try axes" in off_upright("here", ("x", "y", "z"), fallen)
+
+
+def test_a_mean_over_turns_says_nothing_of_gravity() -> None:
+    """An IMU that rests upright, and is then turned over and over: the mean force points sideways."""
+    time = np.arange(4000) * 0.01
+    angle = np.where(time < 10.0, 0.0, 3.0 * (time - 10.0))
+    force = (
+        -9.8 * np.column_stack([0.0 * time, np.sin(angle), np.cos(angle)]) + [5.0, 0.0, 0.0] * (time > 10.0)[:, None]
+    )
+    rate = np.column_stack([np.where(time < 10.0, 0.0, 3.0), 0.0 * time, 0.0 * time])
+    turned = ImuStream("a", time, 0.01 * rate, 0.01 * force)
+    assert abs(turned.dvel.mean(axis=0)[0]) > abs(turned.dvel.mean(axis=0)[2])
+    assert off_upright("here", ("x", "y", "z"), turned) == ""
+    assert steady_force(time[1000:], turned.dtheta[1000:], turned.dvel[1000:]) is None
 
 
 def rows(values: np.ndarray) -> ImuRows:

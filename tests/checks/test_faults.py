@@ -137,9 +137,10 @@ def test_values_that_stay_at_the_largest_one_are_a_warning(channel: int, unit: f
     whole[:, channel] = unit * values / RATE_HZ
     assert clipped(rows(whole), "left", 0.0) == ()
     whole[:, channel] = unit * np.clip(values, -250.0, 250.0) / RATE_HZ
-    (text,) = clipped(rows(whole), "left", 0.0)
-    assert f"{name} of IMU left stays at exactly 250" in text
-    assert clipped(rows(whole), "left", 0.0, gyro=False) == (() if channel < 3 else (text,))
+    (finding,) = clipped(rows(whole), "left", 0.0)
+    assert f"{name} of IMU left stays at exactly 250" in finding.text
+    assert finding.size == pytest.approx(250.0)
+    assert clipped(rows(whole), "left", 0.0, gyro=False) == (() if channel < 3 else (finding,))
 
 
 def test_a_coarse_gyro_at_rest_is_not_clipped() -> None:

@@ -352,7 +352,7 @@ def test_doubtful_input_is_warned_of(case: str, tmp_path: Path) -> None:
     spoil, text = WARNINGS[case]
     values = write_vehicle(tmp_path)
     spoil(tmp_path, values)
-    warnings = load(write_config(tmp_path, values)).warnings
+    warnings = load(write_config(tmp_path, values)).sentences
     assert any(re.search(text, warning) for warning in warnings), warnings
 
 

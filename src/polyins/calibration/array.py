@@ -33,8 +33,8 @@ def calibrate(recording: Recording, entries: Sequence[ImuEntry]) -> Calibration:
     """Estimate how the IMUs of a rigid array differ, and from attitudes that were held what they have in common.
 
     `entries`: as configured; they hold the matrices that the streams are corrected by already. All streams must be on
-    one clock. Raises InputError without motion, and for a single IMU that was not held in enough attitudes; where clocks
-    were found, they are what there is then.
+    one clock. Raises InputError without motion, and for a single IMU that was not held in enough attitudes; where
+    clocks were found, they are what there is then.
     """
     try:
         return _errors(recording, entries)

@@ -42,8 +42,8 @@ class _WheelMotion:
 def calibrate(recording: Recording) -> Calibration:
     """Estimate radius, spin axis, its sense and lever arm of each wheel IMU, and the mounting angles of body IMUs.
 
-    All streams must be on one clock. Without GNSS radii stay as configured. Raises InputError without an IMU on a wheel,
-    a standstill or a drive.
+    All streams must be on one clock. Without GNSS radii stay as configured. Raises InputError without an IMU on a
+    wheel, a standstill or a drive.
     """
     mounted = list(zip(recording.rig.imus, recording.imus, strict=True))
     wheels = [_rolling(imu, motion(stream)) for imu, stream in mounted if imu.wheel is not None]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polyins.checks.no_data import left_out
-from polyins.errors import InputError
+from polyins.errors import ImplausibleError, InputError
 from polyins.formats.rows import ImuRows, intervals, without
 from polyins.model.findings import LEFT_OUT, Finding
 from polyins.model.recording import Array, ImuStream
@@ -86,13 +86,13 @@ def _dead(stream: ImuStream) -> Finding:
     )
 
 
-def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) -> tuple[str, ...]:
-    """Return warnings of values that stay at exactly the largest one, in sensor axes.
+def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) -> tuple[Finding, ...]:
+    """Return findings of values that stay at exactly the largest one, in sensor axes.
 
     `gyro`: of gyros, too; not needed where their range is known.
     """
     rates = _rates(rows)
-    texts = []
+    found = []
     for k in range(0 if gyro else 3, 6):
         size = np.abs(rates[:, k])
         largest = size.max()
@@ -100,31 +100,39 @@ def clipped(rows: ImuRows, name: str, clock_offset: float, gyro: bool = True) ->
         if not runs:
             continue
         distinct = rates[np.diff(rates[:, k], prepend=np.nan) != 0.0, k]
-        if not _is_rough(distinct[:, None], 3, DIGITS * largest):
+        if not is_rough(distinct[:, None], 3, DIGITS * largest):
             continue
         if largest < LEAST_STEPS * np.median(np.abs(np.diff(distinct))):
             continue
-        value = f"{np.degrees(largest):.4g} deg/s" if k < 3 else f"{largest:.4g} m/s^2"
-        remedy = "; gyro_range_deg_s leaves such rows out" if k < 3 else ""
+        value, unit = (float(np.degrees(largest)), "deg/s") if k < 3 else (float(largest), "m/s^2")
+        begin, end = (float(rows.time[row] + clock_offset) for row in (runs[0][0], runs[-1][1] - 1))
         imu = f"IMU {name}" if name else "the IMU"
-        texts.append(
-            f"{rows.source.path}: {NAMES[k]} of {imu} stays at exactly {value}, its largest value, {len(runs)} "
-            f"time(s), first at {rows.time[runs[0][0]] + clock_offset:.3f} s: is that the end of its range?{remedy}"
+        text = (
+            f"{rows.source.path}: {NAMES[k]} of {imu} stays at exactly {value:.4g} {unit}, its largest value, "
+            f"{len(runs)} time(s), first at {begin:.3f} s: is that the end of its range?"
         )
-    return tuple(texts)
+        remedy = "gyro_range_deg_s leaves such rows out" if k < 3 else ""
+        found.append(Finding("saturation", text, "note", name, NAMES[k], begin, end, value, remedy=remedy))
+    return tuple(found)
 
 
 def check_distinct(streams: Sequence[ImuStream]) -> None:
     """Raise InputError if two IMUs show the same samples throughout, which two sensors never do."""
     for i, one in enumerate(streams):
         for other in streams[i + 1 :]:
-            same = len(one.time) == len(other.time) and len(one.time) >= LEAST_SAMPLES
-            if same and np.array_equal(one.dtheta, other.dtheta) and np.array_equal(one.dvel, other.dvel):
-                distinct = one.dtheta[np.diff(one.dtheta[:, 0], prepend=np.nan) != 0.0]
-                if _is_rough(distinct, 1, 0.0):
-                    raise InputError(
-                        f"IMU {one.name} and IMU {other.name}: their samples are identical; expected two sensors"
-                    )
+            if are_copies(one, other):
+                raise ImplausibleError(
+                    "twice", f"IMU {one.name} and IMU {other.name}: their samples are identical; expected two sensors"
+                )
+
+
+def are_copies(one: ImuStream, other: ImuStream) -> bool:
+    """Whether two IMUs show the same samples throughout, with noise that no two sensors share."""
+    same = len(one.time) == len(other.time) and len(one.time) >= LEAST_SAMPLES
+    if not same or not (np.array_equal(one.dtheta, other.dtheta) and np.array_equal(one.dvel, other.dvel)):
+        return False
+    distinct = one.dtheta[np.diff(one.dtheta[:, 0], prepend=np.nan) != 0.0]
+    return is_rough(distinct, 1, 0.0)
 
 
 def _rates(rows: ImuRows) -> Array:
@@ -148,7 +156,7 @@ def _frozen(rows: ImuRows) -> NDArray[np.bool_]:
     begins = np.flatnonzero(first)
     lengths = np.diff(begins, append=len(first))
     long = np.flatnonzero(lengths > LONGEST_REPEAT * np.median(lengths))
-    if not long.size or not _is_rough(rates[first], 1, SAME * float(np.abs(rates).max())):
+    if not long.size or not is_rough(rates[first], 1, SAME * float(np.abs(rates).max())):
         return frozen
     for k in long:
         frozen[begins[k] + 1 : begins[k] + lengths[k]] = True
@@ -162,7 +170,7 @@ def _changes(rates: Array) -> NDArray[np.bool_]:
     return np.concatenate([[True], np.logical_or.reduce(moved)])
 
 
-def _is_rough(distinct: Array, order: int, least: float) -> bool:
+def is_rough(distinct: Array, order: int, least: float) -> bool:
     """Return whether any channel has noise, from rows that all differ, by its differences of that order and the next.
 
     Motion makes less of higher ones, the digits that a file has make more.

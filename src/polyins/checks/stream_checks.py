@@ -5,13 +5,16 @@ A check raises InputError or returns warnings; the thresholds stand at the top.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
-from polyins.errors import InputError
+from polyins.checks.vouched import vouched
+from polyins.errors import ImplausibleError, InputError
 from polyins.formats.rows import ImuRows, RowSource, Track
 from polyins.model.axes import axes_matrix, right_handed_axes
 from polyins.model.geodesy import displacement
-from polyins.model.recording import Array, usual_interval
+from polyins.model.recording import Array, ImuStream, usual_interval
 from polyins.model.rig import STANDARD_GRAVITY
 from polyins.prepare.plausible import BODY, WHEEL
 from polyins.prepare.timesync import LEAST_COMMON, common_begin, common_end, least_common
@@ -34,7 +37,15 @@ GAP_INTERVALS = 1.5
 step is taken for all of it; from `timesync.GAP` intervals on a gap is bridged."""
 JITTER = 0.2
 UPRIGHT = 0.5
-"""Cosine of the largest angle between up in the array and the mean specific force."""
+"""Cosine of the largest angle between up in the array and the specific force of steady stretches."""
+STEADY_S = 0.5
+"""of such a stretch"""
+STEADY_RAD_S = 0.3
+"""that it turns at most: biases of cheap gyros are a third of that"""
+LIKE_GRAVITY = 0.6
+"""m/s^2, by which the mean specific force may differ in size from gravity's: biases of cheap accelerometers"""
+ONE_WAY = 0.8
+"""of gravity's size, that the mean over all steady stretches has unless they point everywhere"""
 MAX_STD_M = 10000.0
 HIGHEST_M = 100000.0
 FASTER_THAN_MOVED = 10.0
@@ -44,24 +55,35 @@ LEAST_SPEED_M_S = 5.0
 MOST_OF_A_WEEK_S = 600000.0
 
 
-def check_imu(rows: ImuRows, max_rate_rad_s: float = MAX_RATE_RAD_S, off_axis_m: float = 0.0) -> tuple[str, ...]:
+def check_imu(
+    rows: ImuRows,
+    max_rate_rad_s: float = MAX_RATE_RAD_S,
+    off_axis_m: float = 0.0,
+    accept: Collection[str] = (),
+) -> tuple[str, ...]:
     """Check one IMU's rows, in the sensor's axes, and return warnings.
 
-    `max_rate_rad_s`: rms turn rate allowed; `off_axis_m`: how far from the axis of its turning it may sit, on a wheel.
+    `max_rate_rad_s`: rms turn rate allowed; `off_axis_m`: how far from the axis of its turning it may sit, on a wheel;
+    `accept`: kinds of judgements that the user overrules.
 
     Raises InputError for fewer than two rows, NaN, stamps that do not increase, and values whose size shows a wrong
     unit.
     """
     check_rows(rows)
-    _check_rate(rows)
-    if not rows.units_known:
-        _check_accel_unit(rows, off_axis_m)
-    rate = _check_gyro_unit(rows, max_rate_rad_s)
+    accepted: list[str] = []
+    with vouched(accept, accepted):
+        _check_rate(rows)
+    with vouched(accept, accepted):
+        if not rows.units_known:
+            _check_accel_unit(rows, off_axis_m)
+    rate = _rms_rate(rows)
+    with vouched(accept, accepted):
+        _check_gyro_unit(rows, rate, max_rate_rad_s)
     texts = _uneven(rows.time)
     if rate > UNUSUAL_RATE_RAD_S and max_rate_rad_s <= MAX_RATE_RAD_S:
         doubt = "" if rows.units_known else f"; is the gyro's unit {rows.gyro_unit}?"
         texts.append(f"turns at {rate:.3g} rad/s (rms), which is unusual{doubt}")
-    return (*rows.warnings, *(f"{rows.source.path}: {text}" for text in texts))
+    return (*rows.warnings, *accepted, *(f"{rows.source.path}: {text}" for text in texts))
 
 
 def check_rows(rows: ImuRows, first_row: int = 0) -> None:
@@ -73,19 +95,40 @@ def check_rows(rows: ImuRows, first_row: int = 0) -> None:
     check_order(rows.source, rows.time, remedy, first_row)
 
 
-def off_upright(name: str, place: str, axes: Axes, time: Array, dvel: Array) -> str:
-    """Say that the mean specific force in array axes does not point up, with axes that would make it so; or nothing.
+def off_upright(place: str, axes: Axes, stream: ImuStream) -> str:
+    """Say that gravity in array axes does not point down, with axes that would make it so; or nothing.
 
-    `dvel`: m/s in array axes (forward, right, down), shape (T, 3); `axes` as configured.
+    `axes` as configured.
     """
-    force = dvel[1:].sum(axis=0) / (time[-1] - time[0])
-    if -force[2] >= UPRIGHT * np.linalg.norm(force):
+    force = steady_force(stream.time, stream.dtheta, stream.dvel)
+    if force is None or -force[2] >= UPRIGHT * np.linalg.norm(force):
         return ""
     return (
-        f"{place}: IMU {name}: with axes [{', '.join(axes)}] the mean specific force is "
+        f"{place}: IMU {stream.name}: with axes [{', '.join(axes)}] the specific force in steady motion is "
         f"[{', '.join(f'{f:.1f}' for f in force)}] m/s^2 forward, right, down; expected about [0, 0, -9.8]. "
         f"Try axes: [{', '.join(upright_axes(axes, force))}]"
     )
+
+
+def steady_force(time: Array, dtheta: Array, dvel: Array) -> Array | None:
+    """Return the mean specific force of the stretches in which it is gravity's, m/s^2, or None where nothing tells.
+
+    There it has gravity's size and what it acts on does not turn; a mean over turns tells nothing. `time`: s, (T,);
+    `dtheta`, `dvel`: rad and m/s, (T, 3). Of stretches that point everywhere none tells.
+    """
+    rows = max(round(STEADY_S / usual_interval(time)), 1)
+    edges = np.arange(0, len(time), rows)
+    lengths = np.diff(time[edges])
+    if not len(lengths):
+        return None
+    whole = lengths < GAP_INTERVALS * STEADY_S
+    rates, forces = (np.diff(np.cumsum(one, axis=0)[edges], axis=0) / lengths[:, None] for one in (dtheta, dvel))
+    sizes = _sizes(forces)
+    steady = whole & (np.abs(sizes - STANDARD_GRAVITY) < LIKE_GRAVITY) & (_sizes(rates) < STEADY_RAD_S)
+    if not steady.any():
+        return None
+    force = np.asarray(forces[steady].mean(axis=0))
+    return force if np.linalg.norm(force) > ONE_WAY * STANDARD_GRAVITY else None
 
 
 def upright_axes(axes: Axes, force: Array) -> Axes:
@@ -105,8 +148,8 @@ def upright_axes(axes: Axes, force: Array) -> Axes:
     return max(right_handed_axes(), key=rating)
 
 
-def check_track(track: Track, what: str) -> tuple[str, ...]:
-    """Check positions of GNSS or a reference and return warnings.
+def check_track(track: Track, what: str, accept: Collection[str] = ()) -> tuple[str, ...]:
+    """Check positions of GNSS or a reference and return warnings; `accept` as for `check_imu`.
 
     Raises InputError for no rows, NaN, stamps that do not increase, coordinates that no place on Earth has.
     """
@@ -121,8 +164,10 @@ def check_track(track: Track, what: str) -> tuple[str, ...]:
     check_order(track.source, track.time)
     if track.geodetic:
         _check_coordinates(track)
-    _check_heights_and_speeds(track)
-    return track.warnings
+    accepted: list[str] = []
+    with vouched(accept, accepted):
+        _check_heights_and_speeds(track)
+    return (*track.warnings, *accepted)
 
 
 def _check_heights_and_speeds(track: Track) -> None:
@@ -133,9 +178,10 @@ def _check_heights_and_speeds(track: Track) -> None:
     height = track.position[:, 2]
     above = np.flatnonzero(np.abs(height) > HIGHEST_M)
     if 2 * len(above) > len(height):
-        raise InputError(
+        raise ImplausibleError(
+            "units",
             f"{track.source.place(int(above[0]))}: height is {height[above[0]]:.6g} m; expected at most "
-            f"{HIGHEST_M:g} m: is it in mm? (columns.position.scale)"
+            f"{HIGHEST_M:g} m: is it in mm? (columns.position.scale)",
         )
     if track.velocity is None or len(track.time) < 3:
         return
@@ -144,9 +190,10 @@ def _check_heights_and_speeds(track: Track) -> None:
     speeds = np.linalg.norm(track.velocity[1:, :2], axis=1)
     usual, fastest = float(np.median(speeds)), float(np.quantile(rates, 0.9))
     if usual > FASTER_THAN_MOVED * fastest + LEAST_SPEED_M_S:
-        raise InputError(
+        raise ImplausibleError(
+            "units",
             f"{track.source.path}: velocities are {usual:.4g} m/s in the middle, the positions change by "
-            f"{fastest:.4g} m/s at most; expected m/s (columns.velocity.scale)"
+            f"{fastest:.4g} m/s at most; expected m/s (columns.velocity.scale)",
         )
 
 
@@ -232,9 +279,10 @@ def check_order(source: RowSource, time: Array, remedy: str = "", first_row: int
 def _check_rate(rows: ImuRows) -> None:
     rate = 1.0 / usual_interval(rows.time)
     if not RATES_HZ[0] <= rate <= RATES_HZ[1]:
-        raise InputError(
+        raise ImplausibleError(
+            "sampling",
             f"{rows.source.path}: {rate:.4g} rows per second of the stamps; expected {RATES_HZ[0]:g} to "
-            f"{RATES_HZ[1]:g} for an IMU: is the unit of time (s, ms, us, ns) right?"
+            f"{RATES_HZ[1]:g} for an IMU: is the unit of time (s, ms, us, ns) right?",
         )
 
 
@@ -257,7 +305,7 @@ def _check_accel_unit(rows: ImuRows, off_axis_m: float) -> None:
         hint = "values look like m/s^2; say unit: m/s^2"
     else:
         hint = "unit, rate or columns are wrong, or gravity was taken out"
-    raise InputError(f"{rows.source.path}: with unit {unit} {said}; expected about 9.8. {hint}")
+    raise ImplausibleError("units", f"{rows.source.path}: with unit {unit} {said}; expected about 9.8. {hint}")
 
 
 def _sizes(vectors: Array) -> Array:
@@ -270,21 +318,25 @@ def _like_gravity(size: float) -> bool:
     return GRAVITY_M_S2[0] <= size <= GRAVITY_M_S2[1]
 
 
-def _check_gyro_unit(rows: ImuRows, max_rate: float) -> float:
+def _rms_rate(rows: ImuRows) -> float:
     """Return the rms turn rate, rad/s."""
+    return float(np.sqrt(np.mean((_sizes(rows.dtheta[1:]) / np.diff(rows.time)) ** 2)))
+
+
+def _check_gyro_unit(rows: ImuRows, rms: float, max_rate: float) -> None:
     turn = _sizes(rows.dtheta[1:])
-    rms = float(np.sqrt(np.mean((turn / np.diff(rows.time)) ** 2)))
     largest = int(np.argmax(turn))
     on_wheel = max_rate > MAX_RATE_RAD_S
     # degrees mistaken for radians make rates that no gyro has, radians mistaken for degrees make small ones
     in_degrees = rows.gyro_unit == "deg/s" and rms <= BODY.rate
     if rows.units_known or ((on_wheel or turn[largest] <= MAX_TURN_RAD) and (rms <= max_rate or in_degrees)):
-        return rms
+        return
     other = {"rad/s": "deg/s", "rad": "rad/s or deg/s", "deg": "deg/s", "deg/s": "another"}[rows.gyro_unit]
-    raise InputError(
+    raise ImplausibleError(
+        "units",
         f"{rows.source.place(largest + 1)}: with unit {rows.gyro_unit} the turn in one interval is "
         f"{turn[largest]:.3g} rad (rms rate {rms:.3g} rad/s); expected at most {MAX_TURN_RAD:g} rad and "
-        f"{max_rate:g} rad/s: is the unit {other}?{'' if on_wheel else ' (On a wheel, it needs the section wheel.)'}"
+        f"{max_rate:g} rad/s: is the unit {other}?{'' if on_wheel else ' (On a wheel, it needs the section wheel.)'}",
     )
 
 

@@ -3,6 +3,7 @@
 A key whose unit is not SI carries it. An unknown key is an error that names the nearest known one.
 """
 
+from polyins.config.checks import Checks
 from polyins.config.columns import (
     AccelColumns,
     AttitudeColumns,
@@ -33,6 +34,7 @@ __all__ = [
     "NOISE_GRADES",
     "AccelColumns",
     "AttitudeColumns",
+    "Checks",
     "Config",
     "Filter",
     "FineTime",

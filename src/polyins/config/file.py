@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self, TypeVar
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
+from polyins.config.checks import Checks
 from polyins.config.fields import AT_KEY, Positive, Section, number
 from polyins.config.imu import ImuEntry, ImuSettings
 from polyins.config.positions import GnssEntry, ReferenceEntry
@@ -79,6 +80,8 @@ class Config(Section):
     """intervals in which GNSS is withheld: a schedule, or a list of [from, to] in s"""
     filter: Filter = Filter()
     """what the filter is told beyond the sensors"""
+    checks: Checks = Checks()
+    """which judgements of the data do not count"""
 
     @model_validator(mode="before")
     @classmethod

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,25 @@ from polyins.errors import InputError
 from polyins.files import find, read_text
 
 Key = str | int
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value for a key."""
+
+    keys: tuple[Key, ...]
+    value: Any
+    """plain; None takes the key away"""
+
+    @property
+    def key(self) -> str:
+        """The key as a user reads it."""
+        return key_path(self.keys)
+
+    @property
+    def sentence(self) -> str:
+        """Say it as a user writes it."""
+        return f"{self.key}: {'left out' if self.value is None else flow(self.value)}"
 
 
 class Document:
@@ -41,6 +62,27 @@ class Document:
             yield
         except InputError as error:
             raise self.error(keys, str(error)) from error
+
+    def changed(self, settings: Sequence[Setting]) -> Document:
+        """Return the document with other values; comments and layout stay.
+
+        What `settings` take out of lists goes last, so that all count places as they are now.
+        """
+        tree = deepcopy(self._tree)
+        for one in settings:
+            if one.value is not None:
+                _put(tree, one.keys, one.value)
+        for keys in sorted({one.keys for one in settings if one.value is None}, key=_order, reverse=True):
+            parent = tree
+            for key in keys[:-1]:
+                parent = parent[key]
+            del parent[keys[-1]]
+        return Document(self.path, tree, self.duplicate)
+
+    @property
+    def text(self) -> str:
+        """The YAML, with its comments."""
+        return write_yaml(self._tree)
 
     def _line(self, keys: Sequence[Key]) -> int | None:
         node: Any = self._tree
@@ -103,12 +145,45 @@ def write_yaml(values: dict[str, Any]) -> str:
     return text.getvalue()
 
 
+def quoted(text: object) -> str:
+    """Write a text as YAML."""
+    return "'" + str(text).replace("'", "''") + "'"
+
+
+def flow(value: Any) -> str:
+    """Write plain values as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(flow(item) for item in value) + "]"
+    return quoted(value) if isinstance(value, str) else str(value)
+
+
 def key_path(keys: Sequence[Key]) -> str:
     """Write keys as a user reads them: `imus[0].noise`."""
     text = ""
     for key in keys:
         text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
     return text
+
+
+def _order(keys: tuple[Key, ...]) -> list[tuple[bool, str, int]]:
+    """Return what keys are sorted by, indices by their size."""
+    return [(isinstance(key, int), "", key) if isinstance(key, int) else (False, key, 0) for key in keys]
+
+
+def _put(tree: Any, keys: Sequence[Key], value: Any) -> None:
+    """Write a value under its key, making mappings as needed."""
+    from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+    for key in keys[:-1]:
+        if isinstance(tree, dict) and not isinstance(tree.get(key), dict | list):
+            tree[key] = CommentedMap()
+        tree = tree[key]
+    if isinstance(value, list | tuple):
+        value = CommentedSeq(value)
+        value.fa.set_flow_style()
+    tree[keys[-1]] = value
 
 
 def _plain(node: Any) -> Any:

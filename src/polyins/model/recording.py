@@ -278,6 +278,8 @@ class Recording:
     """what the heights of geodetic positions count from"""
     utc_of_zero: float | None = None
     """Unix time at which the common clock shows zero, s; None: no file tells it"""
+    accepted: tuple[str, ...] = ()
+    """kinds of findings that the user vouches for: they are notes"""
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 from polyins.model.findings import Finding
 from polyins.model.recording import Recording
 from polyins.prepare.blocks import Blocks
@@ -17,11 +20,20 @@ def of_data(recording: Recording, aligned: Aligned, end: float) -> tuple[Finding
     """Return which IMUs disagree or are noisy, which clocks disagree, and what is wrong with the fixes.
 
     `aligned`: the IMUs of the recording, or the beginning of what they measured; `end`: of all of it, s. Raises
-    InputError as `delays` does.
+    InputError as `delays` does. Kinds that the user vouches for are notes.
     """
+    found = _found(recording, aligned, end)
+    return tuple(replace(one, severity="note") if one.kind in recording.accepted else one for one in found)
+
+
+def _found(recording: Recording, aligned: Aligned, end: float) -> Iterator[Finding]:
     rig, gnss = recording.rig, recording.gnss
-    fixes = () if gnss is None else of_fixes(gnss, recording.geodetic, end)
     if rig.has_wheels:
-        return (*of_turning(rig, aligned), *fixes)
-    blocks = Blocks.of(aligned)
-    return (*disagreements(rig, aligned), *noisy(rig, blocks), *delays(recording, blocks), *fixes)
+        yield from of_turning(rig, aligned)
+    else:
+        blocks = Blocks.of(aligned)
+        yield from disagreements(rig, aligned)
+        yield from noisy(rig, blocks)
+        yield from delays(recording, blocks)
+    if gnss is not None:
+        yield from of_fixes(gnss, recording.geodetic, end)

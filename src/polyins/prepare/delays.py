@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polyins.errors import InputError
+from polyins.errors import ImplausibleError
 from polyins.model.findings import Finding, Severity
 from polyins.model.geodesy import displacement
 from polyins.model.recording import GnssStream, Recording
@@ -98,7 +98,7 @@ def delays(recording: Recording, blocks: Blocks) -> tuple[Finding, ...]:
     if rig.has_wheels:
         return ()
     late = [] if len(rig.imus) < 3 else list(_of_imus(rig, blocks))
-    return (*late, *(() if gnss is None else _of_fixes(blocks, gnss, recording.geodetic)))
+    return (*late, *(() if gnss is None else _of_fixes(blocks, gnss, recording)))
 
 
 # --- IMUs -------------------------------------------------------------------------------------------------------------
@@ -112,7 +112,7 @@ def _of_imus(rig: Rig, blocks: Blocks) -> Iterator[Finding]:
             if blocks.whole[part, i].mean() < 0.9:
                 continue
             own = np.ascontiguousarray(blocks.rates[part, :3, i].T)
-            told = _lag(own, np.ascontiguousarray(blocks.middle[part, :3].T), blocks.interval)
+            told = lag(own, np.ascontiguousarray(blocks.middle[part, :3].T), blocks.interval)
             if told is not None:
                 found.append(_Delay(float(blocks.time[part][0]), float(blocks.time[part][-1]), *told))
         off = [one for one in found if abs(one.delay) > max(LEAST_IMU_DELAY, SURE * one.std)]
@@ -124,7 +124,7 @@ def _of_imus(rig: Rig, blocks: Blocks) -> Iterator[Finding]:
             yield _finding(imu.name, off, size, "doubt" if abs(size) > HARMFUL else "note")
 
 
-def _lag(own: Array, mean: Array, interval: float) -> tuple[float, float] | None:
+def lag(own: Array, mean: Array, interval: float) -> tuple[float, float] | None:
     """Return by how much one signal, shape (3, K), is later than another, s, and how sure that is; None: not told.
 
     own(t + D) = mean(t). D is m where the mean square of own(t + m) - mean(t) is least, of means over some blocks; near
@@ -167,7 +167,7 @@ def _misfits(own: Array, mean: Array, reach: int) -> Array:
 
 
 @dataclass(frozen=True)
-class _Turns:
+class Turns:
     """By how much the course turned from one displacement, or velocity, to the next."""
 
     begin: Array
@@ -180,8 +180,9 @@ class _Turns:
     speed: Array
     """m/s (K, 2): before and after"""
 
-    def at(self, rows: slice) -> _Turns:
-        return _Turns(self.begin[rows], self.end[rows], self.turned[rows], self.std[rows], self.speed[rows])
+    def at(self, rows: slice) -> Turns:
+        """Return some of them."""
+        return Turns(self.begin[rows], self.end[rows], self.turned[rows], self.std[rows], self.speed[rows])
 
     def by_gyros(self, time: Array, yaw: Array, delays: Array) -> Array:
         """Return what the gyros turned at delays, (D, 1) or of each turn (D, K); shape (D, K).
@@ -207,15 +208,17 @@ class _Turns:
         return np.asarray(np.sqrt(weight) * (turned - mean))
 
 
-def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Finding]:
-    turns = _turns(gnss, geodetic)
+def _of_fixes(blocks: Blocks, gnss: GnssStream, recording: Recording) -> Iterator[Finding]:
+    turns = turns_of_course(gnss, recording.geodetic)
     steps = np.diff(blocks.time, prepend=blocks.time[0] - blocks.interval)
     yaw = np.cumsum(blocks.middle[:, 2] * steps)
     parts = [turns.at(slice(k, k + TURNS)) for k in range(0, len(turns.begin) - LEAST_TURNS + 1, TURNS)]
     found = list(_told(blocks.time, yaw, parts))
     # what no part is sure of all of them may be
     off = _late(found) or _late(list(_told(blocks.time, yaw, [turns])))
-    trend = _surest_trend(blocks.time, yaw, gnss, geodetic, _typical(off or found)) if len(found) > 1 else None
+    trend = (
+        _surest_trend(blocks.time, yaw, gnss, recording.geodetic, _typical(off or found)) if len(found) > 1 else None
+    )
     if not off and trend is not None:
         off = found
     if not off:
@@ -223,13 +226,15 @@ def _of_fixes(blocks: Blocks, gnss: GnssStream, geodetic: bool) -> Iterator[Find
     size = _typical(off) if trend is None else trend.delay
     expected = [size if trend is None else trend.at(0.5 * (one.begin + one.end)) for one in found]
     agree = all(abs(one.delay - there) < STEP for one, there in zip(found, expected, strict=True))
-    if abs(size) > HOPELESS and 1 < len(off) == len(found) and agree:
+    hopeless = abs(size) > HOPELESS and "delay" not in recording.accepted
+    if hopeless and 1 < len(off) == len(found) and agree:
         late = "late" if size > 0.0 else "early"
         more, keys = _drifting(trend, size)
         digits = 1 if trend is None else 3
-        raise InputError(
+        raise ImplausibleError(
+            "delay",
             f"GNSS: its course turns as the gyros do, {abs(size):.1f} s {late} all along{more}; expected one clock:"
-            f" gnss.clock_offset_s: {-size:.{digits}f}{keys} corrects that, or gnss.time_offset: estimate"
+            f" gnss.clock_offset_s: {-size:.{digits}f}{keys} corrects that, or gnss.time_offset: estimate",
         )
     std = float(np.median(gnss.position_std[:, :2]))
     largest = max(abs(size), *map(abs, expected)) if trend is not None else abs(size)
@@ -264,7 +269,7 @@ def _surest_trend(time: Array, yaw: Array, gnss: GnssStream, geodetic: bool, del
     area = np.concatenate([[0.0], np.cumsum(0.5 * (yaw[1:] + yaw[:-1]) * np.diff(time))])
     mean = (np.interp(time + half, time, area) - np.interp(time - half, time, area)) / (2.0 * half)
     kinds = [(mean, ways)] + ([] if gnss.velocity is None else [(yaw, gnss)])
-    turned = [(about, _turns(fixes, geodetic)) for about, fixes in kinds]
+    turned = [(about, turns_of_course(fixes, geodetic)) for about, fixes in kinds]
     found = [_trend(time, about, turns, delay) for about, turns in turned if len(turns.begin) >= LEAST_TURNS]
     surest = min(found, key=lambda one: one.drift_std, default=None)
     if surest is None or abs(surest.drift) < SURE_OF_FIXES * surest.drift_std:
@@ -272,7 +277,7 @@ def _surest_trend(time: Array, yaw: Array, gnss: GnssStream, geodetic: bool, del
     return surest if abs(surest.drift) * (gnss.time[-1] - gnss.time[0]) > LEAST_FIX_DELAY else None
 
 
-def _trend(time: Array, yaw: Array, turns: _Turns, delay: float) -> _Trend:
+def _trend(time: Array, yaw: Array, turns: Turns, delay: float) -> _Trend:
     """Return by how much a delay grows, from what it is on the whole, s.
 
     What is not known of the place of the antenna is the same all along and spoils no drift.
@@ -306,7 +311,7 @@ def _drifting(trend: _Trend | None, size: float) -> tuple[str, str]:
     return text, f", clock_drift_ppm: {-trend.drift / PPM:.0f} and clock_reference_s: {trend.middle:.0f}"
 
 
-def _told(time: Array, yaw: Array, parts: Sequence[_Turns]) -> Iterator[_Delay]:
+def _told(time: Array, yaw: Array, parts: Sequence[Turns]) -> Iterator[_Delay]:
     for part in parts:
         told = _best(time, yaw, part) if len(part.begin) >= LEAST_TURNS else None
         if told is not None:
@@ -318,7 +323,7 @@ def _late(found: Sequence[_Delay]) -> list[_Delay]:
     return [one for one in found if abs(one.delay) > max(LEAST_FIX_DELAY, SURE_OF_FIXES * one.std)]
 
 
-def _turns(gnss: GnssStream, geodetic: bool) -> _Turns:
+def turns_of_course(gnss: GnssStream, geodetic: bool) -> Turns:
     """Return where the course is known twice running."""
     if gnss.velocity is not None and gnss.velocity_std is not None:
         time, way, noise = gnss.time, gnss.velocity[:, :2], gnss.velocity_std[:, :2].max(axis=1)
@@ -334,10 +339,10 @@ def _turns(gnss: GnssStream, geodetic: bool) -> _Turns:
     course_std = noise / np.maximum(np.abs(along), 1e-12)
     std = np.sqrt(course_std[k] ** 2 + course_std[k + 1] ** 2 + LEAST_TURN_STD**2)
     both = np.column_stack([speed[k], speed[k + 1]])
-    return _Turns(time[k], time[k + 1], np.angle(along[k + 1] / along[k]), std, both)
+    return Turns(time[k], time[k + 1], np.angle(along[k + 1] / along[k]), std, both)
 
 
-def _best(time: Array, yaw: Array, turns: _Turns) -> tuple[float, float] | None:
+def _best(time: Array, yaw: Array, turns: Turns) -> tuple[float, float] | None:
     """Return at which delay the gyros turned as the course did, s, and its std, s; None: not told.
 
     `yaw` is what they turned up to `time`, rad.
@@ -382,7 +387,7 @@ def _more(left: Array, slope: Array, ahead: Array) -> tuple[float, float]:
     return float(solved[0]), float(np.sqrt(variance * np.linalg.inv(normal)[0, 0]))
 
 
-def _likes(time: Array, yaw: Array, turns: _Turns, own: Array, delays: Array) -> tuple[Array, Array]:
+def _likes(time: Array, yaw: Array, turns: Turns, own: Array, delays: Array) -> tuple[Array, Array]:
     """Return the correlation of turns at each delay, (D,), and what the gyros turned, (D, K)."""
     shifted = turns.centred(turns.by_gyros(time, yaw, delays[:, None]))
     size = np.linalg.norm(shifted, axis=1) * np.linalg.norm(own)

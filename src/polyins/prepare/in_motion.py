@@ -42,6 +42,8 @@ APART = 20.0 * DEG
 """headings that differ by less are one minimum"""
 GRID = 40
 """instants at which the noise of the IMUs enters"""
+ROUNDING = 1e-14
+"""of the trace of a covariance"""
 ANY_HEADING = 180.0 * DEG
 """std that keeps a heading, which nothing tells, where it is"""
 P, V, PHI, BG, BA = (slice(k, k + 3) for k in range(0, 15, 3))
@@ -231,7 +233,7 @@ class _Problem:
         self.imu, self.fixes, self.known = imu, fixes, known
         self.lever = fixes.antenna - imu.point
         covariances = [_covariances(imu, fixes, axis) for axis in range(3)]
-        self.whitening = [np.linalg.inv(np.linalg.cholesky(imus + gnss)) for imus, gnss in covariances]
+        self.whitening = [np.linalg.inv(_root(imus + gnss)) for imus, gnss in covariances]
         self.shares = [w @ imus @ w.T for w, (imus, _) in zip(self.whitening, covariances, strict=True)]
         """of the IMUs in the whitened errors"""
 
@@ -407,6 +409,15 @@ def _covariances(imu: MeanImu, fixes: FixSeries, axis: int) -> tuple[Array, Arra
         response = np.concatenate([of_position, of_velocity][: len(variance)])
         covariance += density * width * response @ response.T
     return covariance, np.diag(np.concatenate(variance))
+
+
+def _root(covariance: Array) -> Array:
+    """Return the Cholesky factor; over minutes what IMUs do to positions outgrows good fixes by all digits."""
+    try:
+        return np.asarray(np.linalg.cholesky(covariance))
+    except np.linalg.LinAlgError:
+        rounding = ROUNDING * float(np.trace(covariance))
+        return np.asarray(np.linalg.cholesky(covariance + rounding * np.eye(len(covariance))))
 
 
 def _skew(vector: Array) -> Array:

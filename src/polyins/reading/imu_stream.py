@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,13 +47,12 @@ class ReadImu:
     """that show something of the motion"""
     stream: ImuStream
     """the same in array axes, on a wheel in the module's"""
-    warnings: tuple[str, ...]
     findings: tuple[Finding, ...]
-    """what is left out of the file"""
+    """what is left out of the file, and what reaches the end of a range"""
 
-    def check(self) -> tuple[str, ...]:
-        """Return warnings of rates and units; raise InputError for those that cannot be right."""
-        return (*checked(self.rows, self.entry), *self.warnings)
+    def check(self, accept: Collection[str] = ()) -> tuple[str, ...]:
+        """Return warnings of rates and units; raise InputError for those that cannot be right and are not accepted."""
+        return checked(self.rows, self.entry, accept)
 
 
 def read_imu(entry: ImuEntry, index: int, document: Document, *, alone: bool) -> ReadImu:
@@ -68,7 +68,7 @@ def read_imu(entry: ImuEntry, index: int, document: Document, *, alone: bool) ->
     range_known = (entry.gyro_range_deg_s or rows.gyro_range_deg_s) is not None
     at_its_end = clipped(rows, entry.name, entry.clock_offset_s, gyro=not range_known) if len(rows.time) > 1 else ()
     with document.at(["imus", index]):
-        return ReadImu(entry, as_mounted(entry), rows, in_array_axes(rows, entry), (*saturated, *at_its_end), found)
+        return ReadImu(entry, as_mounted(entry), rows, in_array_axes(rows, entry), (*found, *saturated, *at_its_end))
 
 
 def measured(rows: ImuRows, entry: ImuEntry, *, alone: bool, first_row: int = 0) -> tuple[ImuRows, tuple[Finding, ...]]:
@@ -138,14 +138,14 @@ def _counted(rows: ImuRows, entry: ImuEntry) -> ImuRows:
     return replace(rows, time=np.arange(len(rows.time)) / entry.rate_hz) if entry.rate_hz else rows
 
 
-def checked(rows: ImuRows, entry: ImuEntry) -> tuple[str, ...]:
-    """Return warnings of rates and units; raise InputError for those that cannot be right."""
+def checked(rows: ImuRows, entry: ImuEntry, accept: Collection[str] = ()) -> tuple[str, ...]:
+    """Return warnings of rates and units; raise InputError for those that cannot be right and are not accepted."""
     if entry.wheel is None:
-        return stream_checks.check_imu(rows)
-    return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, entry.wheel.radius_m)
+        return stream_checks.check_imu(rows, accept=accept)
+    return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, entry.wheel.radius_m, accept)
 
 
-def _within_range(rows: ImuRows, entry: ImuEntry) -> tuple[ImuRows, tuple[str, ...]]:
+def _within_range(rows: ImuRows, entry: ImuEntry) -> tuple[ImuRows, tuple[Finding, ...]]:
     """Leave out rows whose rate reaches the gyro's full scale: how fast it turned then is not known."""
     limit = entry.gyro_range_deg_s or rows.gyro_range_deg_s
     if limit is None or len(rows.time) < 2:
@@ -161,11 +161,18 @@ def _within_range(rows: ImuRows, entry: ImuEntry) -> tuple[ImuRows, tuple[str, .
             f"{rows.source.path}: {count} of {len(rates)} rows reach the gyro's full scale, {limit:g} deg/s; expected "
             "few: gyro_range_deg_s or the unit is wrong, or the sensor does not suit"
         )
-    first = rows.time[int(np.argmax(saturated))] + entry.clock_offset_s
-    return without(rows, saturated), (
+    first, last = rows.time[np.flatnonzero(saturated)[[0, -1]]] + entry.clock_offset_s
+    finding = Finding(
+        "saturation",
         f"{rows.source.path}: the gyro reaches its full scale, {limit:g} deg/s, in {count} row(s), the first at "
         f"{first:.3f} s; they are left out",
+        stream=entry.name,
+        axis="gyro",
+        from_s=float(first),
+        to_s=float(last),
+        size=float(count),
     )
+    return without(rows, saturated), (finding,)
 
 
 def sensor_rotation(entry: ImuEntry) -> NDArray[np.float64]:

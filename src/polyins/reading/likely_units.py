@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from polyins.checks.gravity_turn import turn_of_gravity
 from polyins.formats.stamps import SECONDS
 from polyins.model.recording import Array
 from polyins.model.rig import DEG, STANDARD_GRAVITY
@@ -38,8 +39,7 @@ COUNTS_OF_G = {
 GRAVITY_LIKE = 0.5
 """of the logarithm that a force at rest may be off"""
 AGREES = 0.7
-"""correlation from which the turn of gravity tells the gyro's unit"""
-WINDOW_S = 0.5
+"""correlation from which velocities are those of positions"""
 
 
 @dataclass(frozen=True)
@@ -127,23 +127,6 @@ def quietest(values: Array, step: float) -> float:
         return 0.0
     changes = np.diff(values[: count * rows].reshape(count, rows, 3), 2, axis=1)
     return float(np.nanquantile(np.nanstd(changes, axis=1).max(axis=1), 0.1) / np.sqrt(6.0))
-
-
-def turn_of_gravity(rates: Array, force: Array, step: float) -> float | None:
-    """Return how much the force turns for a turn of the gyro, both of shape (T, 3), where they agree; else None."""
-    rows = max(round(WINDOW_S / step) if step > 0.0 else 1, 1)
-    count = len(rates) // rows
-    if count < 20:
-        return None
-    turn = rates[: count * rows].reshape(count, rows, 3).sum(axis=1) * step
-    means = force[: count * rows].reshape(count, rows, 3).mean(axis=1)
-    up = means / np.linalg.norm(means, axis=1)[:, None]
-    turned = np.diff(up, axis=0).ravel()
-    wanted = -np.cross(0.5 * (turn[1:] + turn[:-1]), 0.5 * (up[1:] + up[:-1])).ravel()
-    size = float(np.linalg.norm(turned) * np.linalg.norm(wanted))
-    if not size > 0.0 or float(turned @ wanted) < AGREES * size:
-        return None
-    return float(turned @ wanted) / float(wanted @ wanted)
 
 
 def angle_scale(latitude: Array, longitude: Array) -> float:

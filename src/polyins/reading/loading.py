@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 
 from polyins.checks import faults, stream_checks, wheel_checks
+from polyins.checks.evidence import Evidence, ImuEvidence
+from polyins.checks.table import in_short
+from polyins.checks.vouched import vouched
 from polyins.config import Config, kf_gins_configuration, parse, wheel_ins_configuration
 from polyins.config.units import read
 from polyins.config.yaml_document import Document, read_yaml, write_yaml
@@ -107,17 +110,27 @@ def build(config: Config, document: Document, mounts_known: bool = True) -> Reco
     `mounts_known`: check that wheels turn as declared and arrays stand upright; what calibrates them needs not know
     yet, and arrays are turned upside down for it.
     """
+    evidence = gather(config, document, mounts_known)
+    recording = evidence.recording
+    if not mounts_known:
+        return recording
+    return replace(recording, findings=(*recording.findings, *in_short(evidence)))
+
+
+def gather(config: Config, document: Document, mounts_known: bool = True) -> Evidence:
+    """Read as `build` does what checks look at."""
     notes = wheel_checks.check_settings(config, document)
-    alone = len(config.imus) == 1
+    alone, accept = len(config.imus) == 1, config.checks.accept
     found = [read_imu(entry, index, document, alone=alone) for index, entry in enumerate(config.imus)]
     alive, dead = faults.alive([one.stream for one in found])
-    notes += one_by_kind([text for i in alive for text in found[i].check()])
+    notes += one_by_kind([text for i in alive for text in found[i].check(accept)])
     measuring = [found[i] for i in alive]
-    faults.check_distinct([one.stream for one in measuring])
+    read_streams = [one.stream for one in measuring]
+    with vouched(accept, notes):
+        faults.check_distinct(read_streams)
     kept, fallen = list(range(len(measuring))), usable.NONE
     if mounts_known:
-        streams_of = [one.stream for one in measuring]
-        kept, fallen = usable.upright([one.entry for one in measuring], alive, streams_of, document)
+        kept, fallen = usable.upright([one.entry for one in measuring], alive, read_streams, document, accept)
     going = [measuring[i] for i in kept]
     imus = tuple(one.imu for one in going)
     known, config = config, config.model_copy(update={"imus": tuple(one.entry for one in going)})
@@ -134,7 +147,12 @@ def build(config: Config, document: Document, mounts_known: bool = True) -> Reco
     recording = assemble(config, document, imus, streams, span, mounts_known)
     warnings = (*notes, *recording.warnings)
     text = in_force(known)
-    return replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
+    recording = replace(recording, warnings=warnings, findings=findings, clock_offsets=offsets, config_text=text)
+    each = (
+        ImuEvidence(place, one.entry, one.imu, one.rows, one.stream)
+        for place, one in zip(alive, measuring, strict=True)
+    )
+    return Evidence(config, document, tuple(each), recording)
 
 
 def assemble(
@@ -150,7 +168,7 @@ def assemble(
     gnss = reference = geodetic = None
     heights: Heights = "ellipsoidal"
     if config.gnss:
-        gnss, geodetic, heights, texts = read_gnss(config.gnss, document, span)
+        gnss, geodetic, heights, texts = read_gnss(config.gnss, document, span, config.checks.accept)
         notes += texts
     if mounts_known:
         notes += wheel_checks.check_motion(config, document, imus, streams, gnss, bool(geodetic))
@@ -183,6 +201,7 @@ def assemble(
         aiding=aiding,
         heights=heights,
         utc_of_zero=clocks.utc_of_zero(config),
+        accepted=config.checks.accept,
     )
 
 

@@ -5,13 +5,14 @@ What looks at the whole recording elsewhere looks at its beginning here: units, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from polyins.checks import faults, stream_checks, wheel_checks
+from polyins.checks.vouched import vouched
 from polyins.config import Config
 from polyins.config.yaml_document import Document
 from polyins.errors import InputError
@@ -201,11 +202,12 @@ def open_long(settings: loading.Settings, least_rows: int = LARGE) -> LongRecord
         StretchReader(file).until(max(until, extent.first + CHECKED_S), extent.first)
         for file, extent in zip(files, extents, strict=True)
     ]
-    checked = [text for both in zip(files, beginnings, strict=True) for text in _checked(*both)]
+    checked = [text for both in zip(files, beginnings, strict=True) for text in _checked(*both, config.checks.accept)]
     notes += loading.one_by_kind(checked)
-    faults.check_distinct(streams)
+    with vouched(config.checks.accept, notes):
+        faults.check_distinct(streams)
     findings = (*dead, *apart, *(finding for extent in extents for finding in extent.findings))
-    kept, fallen = usable.upright(config.imus, places, beginnings, document)
+    kept, fallen = usable.upright(config.imus, places, beginnings, document, config.checks.accept)
     if fallen:
         config, files, extents = _of_imus(kept, config, files, extents)
         span, streams = _span(files, extents), tuple(streams[i] for i in kept)
@@ -285,10 +287,10 @@ def _span(files: Sequence[ImuFile], extents: Sequence[StreamExtent]) -> tuple[fl
     return stream_checks.check_common_span(ends, wait=any(file.entry.wheel for file in files))
 
 
-def _checked(file: ImuFile, stream: ImuStream) -> tuple[str, ...]:
+def _checked(file: ImuFile, stream: ImuStream, accept: Collection[str]) -> tuple[str, ...]:
     """Check the beginning of an IMU's data; what is looked at does not depend on the axes."""
     gyro, accel, wheel = file.columns.gyro.unit, file.columns.accel.unit, file.entry.wheel
     rows = ImuRows(file.source, stream.time, stream.dtheta, stream.dvel, gyro_unit=gyro, accel_unit=accel)
     if wheel is not None:
-        return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, wheel.radius_m)
-    return stream_checks.check_imu(rows)
+        return stream_checks.check_imu(rows, stream_checks.WHEEL_RATE_RAD_S, wheel.radius_m, accept)
+    return stream_checks.check_imu(rows, accept=accept)

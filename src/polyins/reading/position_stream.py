@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -24,7 +25,9 @@ from polyins.reading.log_streams import track_of
 Span = tuple[float, float]
 
 
-def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) -> tuple[Track, list[str]]:
+def _track(
+    entry: GnssEntry | ReferenceEntry, section: str, document: Document, accept: Collection[str] = ()
+) -> tuple[Track, list[str]]:
     """Read and check positions, heights above the ellipsoid, stamps on the recording's clock."""
     with document.at([section, "file"]):
         find_named(entry.file)
@@ -39,7 +42,7 @@ def _track(entry: GnssEntry | ReferenceEntry, section: str, document: Document) 
         raise document.error([section, "stream"], "is given; expected it of a log with several only")
     else:
         track = _file_track(entry, kind)
-    warnings = list(stream_checks.check_track(track, section))
+    warnings = list(stream_checks.check_track(track, section, accept))
     track = replace(track, time=entry.clock.common(track.time))
     raised = _above_ellipsoid(track, entry, section, document)
     if raised is not track and entry.geoid_height_m is None:
@@ -105,12 +108,12 @@ class ConfiguredGnss(NamedTuple):
     notes: list[str]
 
 
-def read_gnss(entry: GnssEntry, document: Document, span: Span) -> ConfiguredGnss:
+def read_gnss(entry: GnssEntry, document: Document, span: Span, accept: Collection[str] = ()) -> ConfiguredGnss:
     """Read the fixes. `span`: of the IMUs, s.
 
     Raises InputError for data and settings that cannot be right.
     """
-    track, warnings = _track(entry, "gnss", document)
+    track, warnings = _track(entry, "gnss", document, accept)
     std = track.position_std
     if entry.position_std_m is not None:
         std = np.tile(entry.position_std_m, (len(track.time), 1))

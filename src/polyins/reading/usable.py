@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from polyins.checks.stream_checks import off_upright
 from polyins.config import ImuEntry
 from polyins.config.yaml_document import Document
-from polyins.errors import InputError
+from polyins.errors import ImplausibleError
 from polyins.model.findings import LEFT_OUT, Finding
 from polyins.model.recording import ImuStream
 from polyins.prepare import mounts
@@ -22,20 +22,25 @@ NONE: Findings = ()
 
 
 def upright(
-    entries: Sequence[ImuEntry], places: Sequence[int], streams: Sequence[ImuStream], document: Document
+    entries: Sequence[ImuEntry],
+    places: Sequence[int],
+    streams: Sequence[ImuStream],
+    document: Document,
+    accept: Collection[str] = (),
 ) -> tuple[list[int], Findings]:
     """Return the indices of those that stand upright, and findings of the others, which most of the array outvote.
 
-    `places`: of the entries in the document. Raises InputError, with axes that are right, where as many do not stand.
+    `places`: of the entries in the document; `accept`: what the user vouches for, all of them if "axes". Raises
+    InputError, with axes that are right, where as many do not stand.
     """
-    body = [i for i, entry in enumerate(entries) if entry.wheel is None]
+    body = [i for i, entry in enumerate(entries) if entry.wheel is None and "axes" not in accept]
     fallen: dict[int, str] = {}
     for i in body:
         place = document.place(["imus", places[i], "axes"])
-        why = off_upright(entries[i].name, place, entries[i].axes, streams[i].time, streams[i].dvel)
+        why = off_upright(place, entries[i].axes, streams[i])
         fallen |= {i: why} if why else {}
     if fallen and 2 * len(fallen) >= len(body):
-        raise InputError(next(iter(fallen.values())))
+        raise ImplausibleError("axes", next(iter(fallen.values())))
     others = [streams[i] for i in body if i not in fallen]
     found: list[Finding] = []
     for i, why in fallen.items():

@@ -93,9 +93,14 @@ def list_flights(folder: Path) -> list[Row]:
 
 def flight(folder: Path, row: Row) -> Recording:
     """Return the recording of one row of `flights.csv`, on the clock of IMU 1."""
+    described = document(folder, row)
+    return build(parse(described), described)
+
+
+def document(folder: Path, row: Row) -> Document:
+    """Return the configuration of one row of `flights.csv`."""
     with resources.as_file(resources.files("polyins.studies") / "flights.yaml") as template:
-        document = read_yaml(template)
-    values = document.values
+        values = read_yaml(template).values
     place = folder / row["flight"]
     values["name"] = f"quadrotor {row['flight']}"
     for number, imu in enumerate(values["imus"], 1):
@@ -120,8 +125,7 @@ def flight(folder: Path, row: Row) -> Recording:
     }
     for section in ("gnss", "reference") if raw else ():
         values[section] |= {"height": "sea-level", "geoid_height_m": HEIGHT_OF_TAKEOFF}
-    document = Document(find(file), values)
-    return build(parse(document), document)
+    return Document(find(file), values)
 
 
 COLUMNS = {

@@ -48,6 +48,13 @@ TARGETS = (
         seconds=(40, 240),
     ),
     Target(
+        "checks",
+        "polyins.studies.data_faults.table:reproduce",
+        datasets=("quadrotor", "wid", "whu-array"),
+        seconds=(60, 280),
+        print_tables="polyins.studies.data_faults.table:print_tables",
+    ),
+    Target(
         "lies",
         "polyins.studies.robustness.lies:reproduce",
         seconds=(10, 30),

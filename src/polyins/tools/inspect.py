@@ -140,7 +140,8 @@ def _problems(stream: Stream, guesses: tuple[str, ...]) -> Facts:
     try:
         if isinstance(stream, ImuRows):
             found = check_imu(stream, WHEEL_RATE_RAD_S, FARTHEST_OFF_AXIS_M)
-            found = (*found, *clipped(stream, "", 0.0, gyro=stream.gyro_range_deg_s is None))
+            at_end = clipped(stream, "", 0.0, gyro=stream.gyro_range_deg_s is None)
+            found = (*found, *(one.sentence for one in at_end))
         else:
             found = check_track(stream, "positions")
     except InputError as error:

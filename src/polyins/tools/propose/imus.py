@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from polyins.config import NOISE_GRADES
+from polyins.config.yaml_document import quoted
 from polyins.formats.rows import ImuRows, intervals
 from polyins.model.recording import usual_interval
 from polyins.model.rig import DEG, HOUR
 from polyins.tools.inspect import describe
 from polyins.tools.propose.axes import axes_lines
-from polyins.tools.propose.lines import Line, quoted
+from polyins.tools.propose.lines import Line
 from polyins.tools.propose.places import BY_UTC, TO_ONE_CLOCK, format_lines, point_line
 from polyins.tools.propose.sources import FoundStream, Roles
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from polyins.model.findings import Finding
 
 CHECK = "# CHECK:"
 TURNED = Finding("mount", "", "doubt", remedy="give axes in a configuration (polyins init writes one)")
 """of what would turn the heading if it were wrong"""
+DATUM_UNKNOWN = Finding("height datum", "", axis="height", remedy="say height and geoid_height_m in a configuration")
+"""of heights that count from a surface that nothing tells"""
 UNIT_GUESSED = Finding(
     "units", "", "doubt", remedy="give columns with unit and scale in a configuration (polyins init writes one)"
 )
@@ -45,17 +46,3 @@ class Line:
         value = self.yaml.strip()
         sentence = f"assumed {value} ({self.why})" if value else self.why
         return Assumption(sentence, replace(self.doubt, text=sentence) if self.doubt else None)
-
-
-def quoted(text: object) -> str:
-    """Write a text as YAML."""
-    return "'" + str(text).replace("'", "''") + "'"
-
-
-def flow(value: Any) -> str:
-    """Write plain values as YAML on one line."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {flow(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(flow(item) for item in value) + "]"
-    return quoted(value) if isinstance(value, str) else str(value)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from polyins.config.yaml_document import flow, quoted
 from polyins.formats.recognize import data_format
 from polyins.model.axes import axes_matrix
 from polyins.tools.propose.axes import shared_axes
-from polyins.tools.propose.lines import UNIT_GUESSED, Line, flow, quoted
+from polyins.tools.propose.lines import UNIT_GUESSED, Line
 from polyins.tools.propose.sources import FoundStream
 
 TRACK_FORMATS = {"kf-gins-gnss": "kf-gins"}

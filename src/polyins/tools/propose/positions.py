@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from polyins.config.yaml_document import flow, quoted
 from polyins.formats import geoid
 from polyins.formats.rows import Track
 from polyins.tools.inspect import describe
-from polyins.tools.propose.lines import Line, flow, quoted
+from polyins.tools.propose.lines import DATUM_UNKNOWN, Line
 from polyins.tools.propose.places import BY_UTC, TO_ONE_CLOCK, format_lines, point_line
 from polyins.tools.propose.sources import FoundStream, Roles
 
@@ -35,11 +36,12 @@ def track_lines(section: str, of: FoundStream, imus: Roles) -> list[Line]:
 def _height_lines(of: FoundStream, track: Track) -> list[Line]:
     doubts = [doubt.text for doubt in of.table.doubts if doubt.about == "heights"] if of.table else []
     lines = [
-        Line("  height: as-given", f"{text}; sea-level with geoid_height_m, or ellipsoidal, say which")
+        Line("  height: as-given", f"{text}; sea-level with geoid_height_m, or ellipsoidal, say which", DATUM_UNKNOWN)
         for text in doubts
     ]
     if not doubts and not track.datum_known:
-        lines.append(Line("  height: ellipsoidal", "the log does not tell what heights are above; else sea-level"))
+        why = "the log does not tell what heights are above; else sea-level"
+        lines.append(Line("  height: ellipsoidal", why, DATUM_UNKNOWN))
     return [*lines, _above_sea()] if track.above_sea else lines
 
 

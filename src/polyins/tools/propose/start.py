@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from polyins.config.yaml_document import flow
 from polyins.formats.rows import Track
 from polyins.model.rig import DEG
-from polyins.tools.propose.lines import Line, flow
+from polyins.tools.propose.lines import Line
 from polyins.tools.propose.sources import FoundStream, Roles
 
 STANDING_M_S = 0.1

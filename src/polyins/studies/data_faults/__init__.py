@@ -1,0 +1,1 @@
+"""Faults injected into good recordings, and whether `check` names each one and puts it right."""
