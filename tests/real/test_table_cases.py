@@ -236,7 +236,7 @@ def test_millimetres_taken_for_metres_are_refused(scale: list[float], cases: Pat
 def test_a_turn_at_the_end_of_the_range(cases: Path, expected: dict[str, Any]) -> None:
     wanted = expected["saturated-turn"]
     found = load(cases / "saturated-turn" / "config.yaml")
-    assert any(f"in {wanted['saturated_rows']} row(s)" in text for text in found.warnings)
+    assert any(f"in {wanted['saturated_rows']} row(s)" in text for text in found.sentences)
     text = propose([cases / "saturated-turn" / "imu.csv"]).text
     assert f"gyro_range_deg_s: {wanted['full_scale_deg_s']}" in text
     assert "axes: [x, y, z]" in text

@@ -114,7 +114,7 @@ def _likeness(turns: Turns, time: Array, yaw: Array, delay: float) -> float:
     rows = np.flatnonzero(inside)
     some = turns.at(slice(int(rows[0]), int(rows[-1]) + 1))
     own = some.centred(some.turned)
-    shifted = some.centred(some.by_gyros(time, yaw, delay + np.arange(-NEAR_S, NEAR_S + 0.05, 0.1)))
+    shifted = some.centred(some.by_gyros(time, yaw, delay + np.arange(-NEAR_S, NEAR_S + 0.05, 0.1)[:, None]))
     size = np.linalg.norm(shifted, axis=1) * np.linalg.norm(own)
     return float(np.max(shifted @ own / np.maximum(size, 1e-12)))
 

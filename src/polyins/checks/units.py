@@ -130,7 +130,7 @@ class _Course:
         if len(turns.begin) < LEAST_TURNS:
             return None
         yaw = np.cumsum(one.stream.dtheta[:, 2])
-        own = turns.centred(turns.by_gyros(one.stream.time, yaw, np.zeros(1))[0])
+        own = turns.centred(turns.by_gyros(one.stream.time, yaw, np.zeros((1, 1)))[0])
         turned = turns.centred(turns.turned)
         size = float(np.linalg.norm(own) * np.linalg.norm(turned))
         return float(own @ turned / (own @ own)) if size > 0.0 and float(own @ turned) > AGREES * size else None
