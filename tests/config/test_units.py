@@ -67,7 +67,7 @@ starts = st.builds(
     attitude_std=st.none() | vectors(positive),
     estimate_gyro_bias=st.booleans(),
 )
-noise = st.builds(NoiseGrade, *(vectors(positive) for _ in range(6)), positive)
+noise = st.builds(NoiseGrade, *(vectors(positive) for _ in range(6)), positive, vectors(positive), vectors(positive))
 errors = st.builds(ImuErrors, *(vectors(signed) for _ in range(4)))
 spreads = st.builds(ImuErrors, *(vectors(positive) for _ in range(4)))
 wheels = st.builds(

@@ -75,7 +75,7 @@ def _axis_names(value: object) -> object:
 
 
 class Noise(Section):
-    """How good an IMU is: random walks, and the std and correlation time of its slow errors (Gauss-Markov)."""
+    """How good an IMU is: random walks, std and correlation time of its slow errors (Gauss-Markov), turn-on biases."""
 
     FIELDS: ClassVar[Mapping[str, str]] = {
         name: f"{name}_std" for name in ("gyro_bias", "accel_bias", "gyro_scale", "accel_scale")
@@ -97,6 +97,11 @@ class Noise(Section):
     """std of the accelerometer scale factor, ppm; the larger, the faster the estimate may change under acceleration"""
     correlation_time_h: Positive
     """of all four, h; the larger, the slower they change and the longer an estimate holds"""
+    gyro_turn_on_deg_s: Spread = ORIGIN
+    """std of the constant that the gyro bias has besides, from one switch-on to the next, deg/s; the larger, the faster
+    the estimate leaves zero, to which it is not drawn back"""
+    accel_turn_on_m_s2: Spread = ORIGIN
+    """the same of the accelerometer bias, m/s^2"""
 
     @model_validator(mode="before")
     @classmethod

@@ -40,7 +40,8 @@ class NoiseGrade:
     """The error statistics of one IMU, per axis, SI, shape (3,) each.
 
     Biases and scale factors are first-order Gauss-Markov processes with the steady-state standard deviations given
-    here and one correlation time (paper A, section III-B2).
+    here and one correlation time (paper A, section III-B2). Biases may have a constant besides, which differs from one
+    switch-on to the next.
     """
 
     angle_random_walk: Vector
@@ -57,10 +58,14 @@ class NoiseGrade:
     """relative"""
     correlation_time: float
     """s"""
+    gyro_turn_on: Vector = field(default_factory=zero_vector)
+    """rad/s, std of the constant in the bias"""
+    accel_turn_on: Vector = field(default_factory=zero_vector)
+    """m/s^2"""
 
     def __post_init__(self) -> None:
         for name in ("angle_random_walk", "velocity_random_walk", "gyro_bias_std", "accel_bias_std",
-                     "gyro_scale_std", "accel_scale_std"):  # fmt: skip
+                     "gyro_scale_std", "accel_scale_std", "gyro_turn_on", "accel_turn_on"):  # fmt: skip
             value = getattr(self, name)
             if not np.all(np.isfinite(value)) or np.any(value < 0.0):
                 raise InputError(f"noise: {name} is {value}, expected numbers that are not negative")
@@ -78,6 +83,8 @@ class NoiseGrade:
         gyro_scale_ppm: ArrayLike,
         accel_scale_ppm: ArrayLike,
         correlation_time_h: float,
+        gyro_turn_on_deg_s: ArrayLike = 0.0,
+        accel_turn_on_m_s2: ArrayLike = 0.0,
     ) -> NoiseGrade:
         """Build from the units of datasheets; each value is one number or one per axis."""
         return cls(
@@ -88,15 +95,32 @@ class NoiseGrade:
             gyro_scale_std=_vector(gyro_scale_ppm) * PPM,
             accel_scale_std=_vector(accel_scale_ppm) * PPM,
             correlation_time=correlation_time_h * HOUR,
+            gyro_turn_on=_vector(gyro_turn_on_deg_s) * DEG,
+            accel_turn_on=_vector(accel_turn_on_m_s2),
         )
 
     def steady_std(self) -> NDArray[np.float64]:
         """Return the standard deviations of the twelve slow errors in the order of the filter's states, (12,)."""
         return np.concatenate([self.gyro_bias_std, self.accel_bias_std, self.gyro_scale_std, self.accel_scale_std])
 
+    def turn_on_std(self) -> NDArray[np.float64]:
+        """Return the standard deviations of the constants in them, (12,)."""
+        return np.concatenate([self.gyro_turn_on, self.accel_turn_on, np.zeros(6)])
+
     def slow_std(self) -> ImuErrors:
-        """Return the same by kind."""
-        return ImuErrors(self.gyro_bias_std, self.accel_bias_std, self.gyro_scale_std, self.accel_scale_std)
+        """Return what is unknown of them at the start, constants and all."""
+        return ImuErrors(*np.split(np.hypot(self.steady_std(), self.turn_on_std()), 4))
+
+    def damping(self) -> NDArray[np.float64]:
+        """Return at which rate the twelve slow errors forget what they were, 1/s, (12,).
+
+        A constant of variance c and a drift of variance d with correlation time T stay correlated by
+        (c + d exp(-t/T)) / (c + d), which for small t decays at d / (c + d) / T: one Gauss-Markov process of variance
+        c + d and that rate is driven by the noise of the drift, 2 d / T, and is as unsure in the long run.
+        """
+        drift, constant = self.steady_std() ** 2, self.turn_on_std() ** 2
+        share = np.where(constant > 0.0, drift / np.maximum(drift + constant, np.finfo(float).tiny), 1.0)
+        return share / self.correlation_time
 
     @classmethod
     def typical(cls, grades: Sequence[NoiseGrade]) -> NoiseGrade:
@@ -114,6 +138,8 @@ class NoiseGrade:
             rms([grade.gyro_scale_std for grade in grades], damping),
             rms([grade.accel_scale_std for grade in grades], damping),
             float(1.0 / damping.mean()),
+            rms([grade.gyro_turn_on for grade in grades]),
+            rms([grade.accel_turn_on for grade in grades]),
         )
 
 
@@ -190,7 +216,7 @@ class Imu:
         """Return the initial standard deviation of the twelve errors, shape (12,)."""
         if self.initial_std is not None:
             return self.initial_std.as_array()
-        return self.noise.steady_std()
+        return self.noise.slow_std().as_array()
 
 
 @dataclass(frozen=True)

@@ -186,7 +186,7 @@ def _fill_block(block: Array, members: tuple[Member, ...], recording: Recording,
     block[covariance.ERROR_PSD : covariance.ERROR_PSD + IMU_ERRORS] = (
         2.0 * noise.steady_std() ** 2 / noise.correlation_time
     )
-    block[covariance.DECAY : covariance.DECAY + IMU_ERRORS] = 1.0 / noise.correlation_time
+    block[covariance.DECAY : covariance.DECAY + IMU_ERRORS] = noise.damping()
     block[covariance.FASTEST] = 1.0 / noise.correlation_time
     block[covariance.GYRO_PSD : covariance.GYRO_PSD + 3] = noise.angle_random_walk**2
     block[covariance.ACCEL_PSD : covariance.ACCEL_PSD + 3] = noise.velocity_random_walk**2
