@@ -103,7 +103,7 @@ def six_filters(test: str) -> tuple[Array, Array]:
     """Return times since the start, s, shape (T,), and the position std of six separate filters, m, shape (6, T, 3)."""
     scenario, std = drive(test), []
     truth = true_run(scenario)
-    recording = record(truth, seed=scenario.seed).recording.without_gate()
+    recording = record(truth, seed=scenario.seed).recording.as_published().without_gate()
     for number, imu in enumerate(recording.rig.imus):
         alone = replace(recording.subset([number]), start=_start(truth.path, imu.position, scenario))
         solution = batch.run(alone, "single")
@@ -152,7 +152,7 @@ def against_count(counts: Sequence[int], common: float, seeds: int, steps: Steps
     for seed in range(seeds):
         report = steps.next()
         truth = true_run(ARRAY.model_copy(update={"seed": seed}))
-        recording = record(_with_common(truth, common, max(counts)), seed=seed).recording.without_gate()
+        recording = record(_with_common(truth, common, max(counts)), seed=seed).recording.as_published().without_gate()
         singles = min(max(counts), IMUS)
         squares[0] += [rms(maxima(recording, "single", imu=i)) ** 2 for i in range(singles)]
         for k, n in enumerate(counts, 1):
@@ -167,7 +167,7 @@ def against_share(shares: Sequence[float], seeds: int, steps: Steps) -> dict[str
     for seed in range(seeds):
         truth = true_run(ARRAY.model_copy(update={"seed": seed}))
         for common in shares:
-            recording = record(_with_common(truth, common, IMUS), seed=seed).recording.without_gate()
+            recording = record(_with_common(truth, common, IMUS), seed=seed).recording.as_published().without_gate()
             single = np.mean([rms(maxima(recording, "single", imu=i)) ** 2 for i in range(IMUS)])
             squares[common].append((float(single), rms(maxima(recording, "enav-fusion")) ** 2))
             steps.next()(1.0)

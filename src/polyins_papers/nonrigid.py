@@ -98,7 +98,9 @@ def with_thickness(scenario: Scenario, thickness_mm: float) -> Scenario:
 def recording_of(scenario: Scenario, number: int) -> Recording:
     """Return the recording of the seed of a number, counted from 0: another ground, other rulers, other errors."""
     seed = FIRST_SEED + number
-    return record(true_run(scenario.model_copy(update={"seed": seed})), seed=seed).recording.without_gate()
+    return (
+        record(true_run(scenario.model_copy(update={"seed": seed})), seed=seed).recording.as_published().without_gate()
+    )
 
 
 def with_forces_at_origin(recording: Recording) -> Recording:

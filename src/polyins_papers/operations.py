@@ -172,7 +172,9 @@ def prepare(method: str, imus: int) -> Prepared:
     from polyins.simulation.run import simulate
     from polyins.simulation.scenario import Board, Scenario
 
-    recording = simulate(Scenario(duration_s=12.0, static_s=5.0, imus=Board(count=imus), rate_hz=RATE_HZ))
+    recording = simulate(
+        Scenario(duration_s=12.0, static_s=5.0, imus=Board(count=imus), rate_hz=RATE_HZ)
+    ).as_published()
     start = replace(recording.start, heading=0.0, heading_from="value")
     return batch.prepare(replace(recording, start=start, outages=()), method)
 
@@ -224,7 +226,7 @@ def count_update(bank: Navigators) -> dict[str, Tally]:
 
     def corrections() -> None:
         for i in range(IMUS):
-            update.member_correction(rows[i // 8], i % 8, own, STRIDE)
+            update.member_correction(rows[i // 8], i % 8, own, STRIDE, False)
 
     def feedback() -> None:
         fuse.correct_members(rows, 0, IMUS, metres, STRIDE)

@@ -84,7 +84,7 @@ class Experiment:
 def _drawn(site: Site, world: World, errors: SensorErrors, noise: Noise, filter_noise: Noise, seed: int) -> Recording:
     run = truth(site, world)
     scenario = run.scenario.model_copy(update={"errors": errors, "noise": noise, "filter_noise": filter_noise})
-    return record(replace(run, scenario=scenario), seed=seed).recording.without_gate()
+    return record(replace(run, scenario=scenario), seed=seed).recording.as_published().without_gate()
 
 
 @lru_cache(maxsize=4)

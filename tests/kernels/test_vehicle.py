@@ -44,7 +44,7 @@ def test_a_later_prediction_is_later() -> None:
 
 @pytest.mark.parametrize("method", ["wheel-ins/left", "triple-ins", "triple-ins/centralized"])
 def test_equal_chips_of_a_module_are_one(method: str) -> None:
-    recording = drive(chips=3)
+    recording = drive(chips=3).as_published()
     run = batch.prepare(recording, method)
     assert [last - first for first, last in run.bank.spans if run.bank.members[first].imu.wheel] == [3] * (
         1 if "wheel" in method else 2

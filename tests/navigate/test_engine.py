@@ -214,7 +214,7 @@ def differences(recording: Recording, method: str) -> dict[str, float]:
 
 
 def recorded(count: int, place: Array, *, equal: bool) -> Recording:
-    recording = shaken_recording(count, SECONDS, fixes=FIX_TIMES, equal=equal, place=place)
+    recording = shaken_recording(count, SECONDS, fixes=FIX_TIMES, equal=equal, place=place).as_published()
     return replace(recording, gnss=received(shaken_path(SECONDS, start=place), recording.rig.antenna, FIX_TIMES, 1))
 
 
@@ -325,9 +325,13 @@ def test_a_virtual_imu_of_one_at_the_origin_is_the_single_imu() -> None:
 
 
 @pytest.mark.parametrize("method", ARRAY_METHODS)
+@pytest.mark.parametrize("common", [0.0, 1.0])
 @pytest.mark.parametrize("chunk", [1, 7, 333])
-def test_chunks_of_any_size_give_the_same_bits(method: str, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_of_any_size_give_the_same_bits(
+    method: str, common: float, chunk: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     recording = recorded(3, WUHAN, equal=False)
+    recording = replace(recording, options=replace(recording.options, common_share=common))
     whole, again = batch.run(recording, method), batch.run(recording, method)
     assert_bit_equal(again, whole)
     monkeypatch.setattr(batch, "CHUNK", chunk)

@@ -43,7 +43,7 @@ def at_rest(duration: float) -> Recording:
 
 @pytest.mark.parametrize("method", ["enav-fusion", "nav-fusion"])
 def test_the_heading_of_an_array_at_rest_stands_still(method: str) -> None:
-    recording = at_rest(600.0)
+    recording = at_rest(600.0).as_published()
     solution = batch.run(recording, method)
     assert solution.measurements["zero rate"].accepted.all()
     assert solution.measurements["zero velocity"].time.size > 590

@@ -143,7 +143,7 @@ def test_headings_hold_the_heading_of_a_hovering_array() -> None:
     truth = calm_path(120.0, speed=Swing(0.02), heading=Swing(2.9), roll=Swing(0.0, 0.0, 0.02, 1.1))
     recording = aided("heading", duration=120.0, truth=truth, imus=3)
     start = replace(recording.start, attitude_std=np.array([0.5, 0.5, 30.0]) * DEG, heading=2.9 + 20.0 * DEG)
-    recording = replace(recording, start=start)
+    recording = replace(recording, start=start).as_published()
     solution = batch.run(recording, "enav-fusion")
     _, held = error_at_reference(solution, recording)
     _, free = error_at_reference(batch.run(replace(recording, aiding=()), "enav-fusion"), recording)

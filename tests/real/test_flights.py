@@ -33,7 +33,7 @@ def recordings(folder: Path) -> list[tuple[Row, Recording]]:
 
 @pytest.fixture(scope="module")
 def outages(recordings: list[tuple[Row, Recording]]) -> list[Outage]:
-    return [outage for row, recording in recordings for outage in flights.fly(recording, row)]
+    return [outage for row, recording in recordings for outage in flights.fly(recording.as_published(), row)]
 
 
 def rms(outages: list[Outage], method: str, length: int = 10) -> float:

@@ -22,7 +22,8 @@ from polyins.kernels.jit import Array, scalar_kernel
     ODOMETER,
     WINDOW,
     PAUSE,
-) = range(11)
+    DEVIATIONS,
+) = range(12)
 
 MEAN: Final = 0
 EACH: Final = 1
@@ -65,6 +66,8 @@ KINDS = (
     Kind("window", "", ()),
     # nor is this: no IMU had data until now, see `navigate.bridging`
     Kind("pause", "", ()),
+    # nor is this: the IMUs of a block are compared with their mean, see `navigate.deviations`
+    Kind("deviations", "", ()),
 )
 
 JOINED = tuple(kind.joined for kind in KINDS)

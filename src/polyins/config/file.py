@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
@@ -36,6 +36,9 @@ class Standstill(Section):
     """of the mean rate, deg/s; the larger, the less a standstill weighs; above what an idling engine shakes"""
 
 
+Share = Annotated[float, BeforeValidator(number), Field(ge=0.0, le=1.0)]
+
+
 class Filter(Section):
     """What the filter is told beyond the sensors."""
 
@@ -47,6 +50,17 @@ class Filter(Section):
     and the farther a fix is moved"""
     gravity_m_s2: Positive = FilterOptions.gravity
     """on a local tangent plane only, m/s^2; one that is too large shows as an acceleration downwards"""
+    common_share: Share = FilterOptions.common_share
+    """of the variances of noise and slow errors, what the IMUs of an array have in common, 0 to 1; the larger, the less
+    the array is believed to be better than one of them; 1: not at all, and no IMU is told from the others (paper A)"""
+    relative_interval_s: Positive | None = FilterOptions.relative_interval
+    """s between two comparisons of the IMUs of an array with their mean; the longer, the later a sick one is found;
+    null: they are not compared"""
+    own_noise: Literal["auto"] | Positive = FilterOptions.own_noise
+    """times the variances that the IMUs are said to have of their own; the larger, the more aids weigh; auto: as the
+    comparisons show, at least 1"""
+    exclusion: bool = FilterOptions.exclusion
+    """an IMU that deviates from the others by more than they do counts no more, until it agrees again"""
     rolling: Rolling = Rolling()
     """how wheels aid the filter"""
     standstill: Standstill | None = None

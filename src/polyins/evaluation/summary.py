@@ -81,7 +81,13 @@ def document(solution: Solution, figures: Figures) -> RunDocument:
         "heights": solution.heights if solution.geodetic else None,
         "utc_of_zero_s": solution.utc_of_zero,
         "exclusions": [
-            {"imu": one.stream, "from_s": one.from_s, "to_s": one.to_s, "cause": one.text, "statistic": None}
+            {
+                "imu": one.stream,
+                "from_s": one.from_s,
+                "to_s": one.to_s,
+                "cause": one.axis or one.text,
+                "statistic": one.size,
+            }
             for one in judged.findings
             if one.kind == LEFT_OUT
         ],

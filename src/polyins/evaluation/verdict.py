@@ -17,6 +17,7 @@ from polyins.evaluation.figures import Epochs, Figures
 from polyins.evaluation.outages import partly_covered
 from polyins.evaluation.receiver import of_receiver
 from polyins.evaluation.wheels import of_wheels
+from polyins.model.comparisons import answered
 from polyins.model.findings import Finding, Severity, Verdict
 from polyins.model.solution import Innovations, Solution
 
@@ -57,13 +58,16 @@ class _Statistics:
 
 def verdict(solution: Solution, figures: Figures) -> Verdict:
     """Return what is to be said of a solution; of it only what has no row per epoch is looked at."""
-    known = (*solution.findings, *of_measurements(solution.measurements, solution.findings))
+    left_out = solution.exclusions
+    told = (*answered(solution.findings, left_out), *(one.finding for one in left_out))
+    known = (*told, *of_measurements(solution.measurements, told))
     return Verdict((*known, *_of_epochs(solution.recording_span, figures.epochs), *_of_reference(figures)))
 
 
 def of_live(navigator: Navigator, findings: Sequence[Finding] = ()) -> Verdict:
     """Return what is to be said of what a navigator has done so far; `findings`: of its configuration."""
-    told = (*findings, *navigator.findings)
+    left_out = navigator.exclusions
+    told = (*answered((*findings, *navigator.findings), left_out), *(one.finding for one in left_out))
     known = (*told, *of_measurements(navigator.measurements, told))
     return Verdict((*known, *_of_epochs(navigator.span, counted(navigator))))
 

@@ -56,7 +56,12 @@ DVEL_N = _take(3)  # velocity increment of the specific force in n
 POINT_POSITION = _take(3)
 POINT_VELOCITY = _take(3)
 OFFSET = _take(16)  # weighted, of what is averaged from the same of the first IMU; see `fuse`
+LEAP = _take(1)  # by how much the last increments of one IMU moved the mean, over what is looked at, squared
 RESIDUAL = _take(3)  # of the last measurement
+DEVIATION = _take(27)  # from the mean of the block, whitened: the newest, and means over a shorter and a longer while
+AXES = _take(3)  # how its axes lie against those of the mean of its block, rad
+EXCLUDED = _take(1)  # 1: it does not count, whatever it has
+AGREED = _take(1)  # s for which one that does not count has agreed
 CORRECTION = _take(states.STATES)  # error state of the last update
 
 SIZE = _layout.size

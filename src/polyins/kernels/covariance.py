@@ -32,10 +32,15 @@ _take = _layout.take
 
 # what a block is told: of the errors beside the navigation state
 ERROR_PSD = _take(LARGEST)  # of what drives each, 2 sigma^2 / tau for a Gauss-Markov process
+GYRO_PSD = _take(3)  # of noise: angle random walk squared, rad^2/s
+ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
+NOISES = LARGEST + 6
+"""numbers up to here that say how fast it becomes unsure"""
 DECAY = _take(LARGEST)  # 1 / tau; zero for what stays
 FASTEST = _take(1)  # the largest 1 / tau
-GYRO_PSD = _take(3)  # noise of one member: angle random walk squared, rad^2/s
-ACCEL_PSD = _take(3)  # velocity random walk squared, m^2/s^3
+MEMBERS = _take(1)  # that count
+COMPARISONS = _take(1)  # of its members with their mean, so far
+OWN_SCALE = _take(1)  # of the noise that each member has of its own, see `navigate.deviations`
 PLACE = _take(3)  # of the point whose state is fused, in vehicle axes, m
 # the fused state of the members, and the mean of their corrected increments as rates
 POSITION = _take(3)
@@ -171,6 +176,13 @@ def _sensor_terms(block: Array, work: Array, dt: float) -> None:
             c = block[MATRIX + 3 * i + j] * dt
             work[F + (_A + j) * HALF + _V + i] = c
             work[F + (_G + j) * HALF + _P + i] = -c
+    noise_terms(block, work, dt)
+
+
+@kernel
+def noise_terms(block: Array, work: Array, dt: float) -> None:
+    """Write half of the noise of gyros and accelerometers over dt."""
+    for i in range(3):
         for j in range(i, 3):
             q_v = 0.0
             q_p = 0.0
@@ -648,6 +660,15 @@ def settle(block: Array) -> None:
         block[LOST + k] = 0.0
     block[OWED] = 0.0
     block[SINCE] = 0.0
+
+
+@scalar_kernel
+def begin_anew(block: Array, i: int, variance: float, stride: int) -> None:
+    """Let nothing be known of a state but its variance; P is complete."""
+    for j in range(stride):
+        block[P + i * stride + j] = 0.0
+        block[P + j * stride + i] = 0.0
+    block[P + i * (stride + 1)] = variance
 
 
 @kernel

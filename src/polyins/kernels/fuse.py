@@ -102,6 +102,25 @@ def add_to_means(lanes: Array, sums: Array) -> None:
 
 
 @kernel
+def leaps(lanes: Array, turn: float, change: float) -> bool:
+    """Whether one IMU of a row, whose offsets were just written, moves the mean by more than that, rad or m/s."""
+    by_turn, by_change = 1.0 / (turn * turn), 1.0 / (change * change)
+    for i in range(LANES):
+        g0, g1, g2 = _three_of(lanes, bank.OFFSET + 10 * LANES + i)
+        a0, a1, a2 = _three_of(lanes, bank.OFFSET + 13 * LANES + i)
+        lanes[bank.LEAP + i] = (g0 * g0 + g1 * g1 + g2 * g2) * by_turn + (a0 * a0 + a1 * a1 + a2 * a2) * by_change
+    found = False
+    for i in range(LANES):
+        found = found or lanes[bank.LEAP + i] > 1.0
+    return found
+
+
+@formula
+def _three_of(lanes: Array, x: int) -> Three:
+    return lanes[x], lanes[x + LANES], lanes[x + 2 * LANES]
+
+
+@kernel
 def _finish_means(sums: Array, block: Array, n: int, to: int, count: int, factor: float) -> None:
     """Write `count` means from the n-th on, times a factor; the weights of a block add up to one."""
     for f in range(count):

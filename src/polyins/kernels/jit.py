@@ -18,7 +18,10 @@ COMPILED = (
     "model/states.py",
     "kernels/*.py",
     "aiding/*.py",
-    *(f"navigate/{name}.py" for name in ("engine", "receiver", "silence", "slip", "state", "update", "window")),
+    *(
+        f"navigate/{name}.py"
+        for name in ("deviations", "engine", "receiver", "silence", "slip", "state", "together", "update", "window")
+    ),
     "simulation/flexible.py",
 )
 

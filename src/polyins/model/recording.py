@@ -217,6 +217,16 @@ class FilterOptions:
     """s: a fix nearer than this to an IMU epoch is applied at that epoch; otherwise the interval is split."""
     gravity: float = 9.80665
     """m/s^2, on a local tangent plane only."""
+    common_share: float = 0.0
+    """of the variances of noise and slow errors, what IMUs that share a covariance block have in common, 0 to 1; of 1
+    the block is told what one IMU is told, which is paper A, and nothing tells the IMUs apart."""
+    relative_interval: float | None = 1.0
+    """s between two comparisons of such IMUs with their mean; None: they are not compared."""
+    own_noise: float | Literal["auto"] = "auto"
+    """times the variances that IMUs are said to have of their own; auto: as they show when they are compared, at least
+    once"""
+    exclusion: bool = True
+    """whether an IMU that deviates from the others counts no more"""
     rolling: RollingOptions = RollingOptions()
     nonholonomic: NonholonomicOptions | None = None
     """None: it is not assumed"""
@@ -285,6 +295,10 @@ class Recording:
     def sentences(self) -> tuple[str, ...]:
         """Warnings and findings."""
         return (*self.warnings, *(finding.sentence for finding in self.findings))
+
+    def as_published(self) -> Recording:
+        """Return the recording for filters as in paper A: a block is told what one IMU is told; all always count."""
+        return replace(self, options=replace(self.options, common_share=1.0))
 
     def without_gate(self) -> Recording:
         """Return the recording with every measurement taken as it is, as the papers do."""

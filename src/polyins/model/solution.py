@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.model.comparisons import NO_COMPARISONS, Comparisons, Exclusion, exclusions
 from polyins.model.findings import SILENT, Finding
 from polyins.model.recording import Heights
 from polyins.model.rig import Vector
@@ -152,6 +153,8 @@ class Solution:
     """shape (K, N, 12)"""
     measurements: dict[str, Innovations] = field(default_factory=dict)
     """what became of the measurements, by the name of their kind, see `aiding.kinds`"""
+    comparisons: Comparisons = NO_COMPARISONS
+    """how the IMUs of a block kept together"""
     offsets: dict[str, OffsetEstimate] = field(default_factory=dict)
     """of height, heading and odometer, where the filter estimates them; times are `imu_error_time`"""
     mounting: Array | None = None
@@ -185,6 +188,11 @@ class Solution:
     def faults(self) -> tuple[str, ...]:
         """IMUs that fell silent, as sentences."""
         return tuple(one.sentence for one in self.findings if one.kind == SILENT)
+
+    @property
+    def exclusions(self) -> tuple[Exclusion, ...]:
+        """Which IMUs did not count when, since they deviated from the others."""
+        return exclusions(self.comparisons, self.imu_names)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -226,6 +234,7 @@ class Solution:
             last,
             **{name: whole(name) for name in (*BY_EPOCH, *BY_LOG, "mounting", "mounting_std", "status")},
             measurements={kind: Innovations.joined(some) for kind, some in measured.items()},
+            comparisons=Comparisons.joined([part.comparisons for part in parts]),
             offsets={
                 name: OffsetEstimate(*(np.concatenate([getattr(one, of) for one in some]) for of in ("value", "std")))
                 for name, some in offsets.items()

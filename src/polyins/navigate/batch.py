@@ -21,7 +21,7 @@ from polyins.model.rig import Rig
 from polyins.model.solution import OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.model.status import USUAL, status_of
-from polyins.navigate import bridging, engine, events, layout, outcome, receiver, restart
+from polyins.navigate import bridging, engine, events, layout, outcome, receiver, restart, sharing
 from polyins.navigate import start as search
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
@@ -296,7 +296,7 @@ def lay_out(
         navigators=navigators,
         inputs=Inputs(nothing, nothing, nothing, nothing, *events.merged()),
         outputs=Outputs(nothing, nothing, nothing, nothing, nothing, nothing),
-        schedule=schedule_of(choice, recording, start),
+        schedule=schedule_of(row, choice, recording, start),
         aided=[start.time],
     )
     inputs = inputs_of(run, aligned, float(aligned.time[0]))
@@ -359,10 +359,11 @@ def present_of(recording: Recording, missing: NDArray[np.bool_]) -> NDArray[np.u
     return present
 
 
-def schedule_of(choice: Choice, recording: Recording, start: Start) -> wheels.Schedule:
+def schedule_of(method: Method, choice: Choice, recording: Recording, start: Start) -> wheels.Schedule:
     """Return when a run measures by itself."""
     several = len(choice.blocks) > 1 and recording.rig.has_wheels
-    return wheels.Schedule(start.time, recording.options, wheels=bool(choice.speed), several=several)
+    compared = sharing.compares(method, recording.options, choice.blocks)
+    return wheels.Schedule(start.time, recording.options, wheels=bool(choice.speed), several=several, compared=compared)
 
 
 def empty_outputs(inputs: Inputs, plan: Plan, errors: int) -> Outputs:
@@ -410,6 +411,7 @@ def solution_of(run: Prepared, filter_s: float = 0.0, first_call_s: float = 0.0)
         imu_errors=log[:, 0, :, :12],
         imu_error_std=log[:, 1, :, :12],
         measurements=outcome.innovations_of(rows, outcome.speed_wheels(run.choice, recording.rig)),
+        comparisons=outcome.comparisons_of(rows, lanes),
         offsets=offsets_of(run, lanes),
         mounting=log[:, 0, :, 12:15] if recording.rig.has_wheels else None,
         mounting_std=log[:, 1, :, 12:15] if recording.rig.has_wheels else None,

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import io
 import json
+import operator
 import typing
 import zipfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +54,7 @@ class Made:
     counts: dict[str, int]
     first: Epoch | None
     """of which the run begins, as long as there is only one"""
-    due: tuple[float, float, float, bool] | None
+    due: tuple[float, float, float, float, bool] | None
     """what the schedule of its own measurements remembers"""
     findings: tuple[Finding, ...] = ()
     """of the parts before pauses, and of those"""
@@ -112,7 +114,8 @@ def _converter() -> Converter:
     converter = Converter()
     converter.register_unstructure_hook_func(_is_array, lambda array: array.tolist())
     converter.register_structure_hook_func(_is_array, lambda value, _: np.array(value))
-    converter.register_structure_hook_func(lambda kind: kind == float | str | None, lambda value, _: value)
+    for plain in (float | str | None, float | Literal["auto"]):
+        converter.register_structure_hook_func(partial(operator.eq, plain), lambda value, _: value)
     return converter
 
 

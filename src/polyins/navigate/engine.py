@@ -13,11 +13,12 @@ from polyins.aiding.wheel_speed import AT_END, DURATION, LATERAL, SPEED
 from polyins.kernels import bank, covariance, dense, earth, fuse, joint, strapdown, vehicle
 from polyins.kernels.bank import LANES
 from polyins.kernels.jit import Array, entry, formula, kernel, scalar_kernel
-from polyins.navigate import silence, slip, update, window
+from polyins.navigate import deviations, silence, slip, together, update, window
 from polyins.navigate.state import (
     AT_REST,
     EARTH,
     INTERVAL,
+    LEAPT,
     LOG_EVERY,
     MAY_BE_SILENT,
     NEXT_EVENT,
@@ -30,6 +31,7 @@ from polyins.navigate.state import (
     SPEED_AT_END,
     STRIDE,
     TIME,
+    TOGETHER,
     VALUES,
     VIRTUAL,
     WINDOW_BEGIN,
@@ -86,6 +88,8 @@ def run(
             if due <= end + snap:
                 aid(navigators, further, inputs, outputs)  # A (6)-(11);  B (5)-(14)
                 due = _next_event(state, inputs)
+        if state.scalars[LEAPT] != 0.0:
+            deviations.compare_at_leap(state, plan, work)
         write(state, plan, outputs, further, k)
         if (k - 1) % log_every == 0:
             _log(state, plan, outputs, end)
@@ -151,6 +155,18 @@ def propagate(
                 _predict_either(block, model, dt, int(plan.settings[STRIDE]))
         elif not joined:
             dense.predict(block, model, dt, full_matrices[0], full_matrices[1])
+        if full_matrices is None and state.deviations.shape[0] > 0 and spans[s, 1] - spans[s, 0] > 1:
+            deviations.drive(state, model, s, dt)
+            if further is None:
+                covariance.predict(state.deviations[s], model, dt)
+            else:
+                _predict_either(state.deviations[s], model, dt, int(plan.settings[STRIDE]))
+    if plan.settings[TOGETHER] != 0.0:
+        together.drive(state, plan, work.covariance[0], dt)
+        if further is None:
+            covariance.predict(blocks[-1], work.covariance[0], dt)
+        else:
+            _predict_either(blocks[-1], work.covariance[0], dt, int(plan.settings[STRIDE]))
     if full_matrices is None:
         if further is not None:
             joint.predict(blocks, work.covariance, dt, state.joint, int(plan.settings[STRIDE]))
@@ -174,6 +190,7 @@ def _mechanize(state: State, plan: Plan, work: Work, fraction: float, dt: float)
     previous = state.scalars[INTERVAL]
     ratio = dt * dt / (6.0 * previous * (previous + dt))
     shared = plan.settings[SHARED_MECHANIZATION] != 0.0 and plan.spans[0, 1] - plan.spans[0, 0] > 1
+    compared = state.deviations.shape[0] > 0
     block_before = -1
     for b in range(state.rows.shape[0]):
         lanes, s = state.rows[b], plan.row_blocks[b]
@@ -190,6 +207,8 @@ def _mechanize(state: State, plan: Plan, work: Work, fraction: float, dt: float)
             if s != block_before:
                 fuse.begin_means(lanes, work.sums[s])
             fuse.add_to_means(lanes, work.sums[s])
+            if compared and fuse.leaps(lanes, deviations.LEAP_TURN, deviations.LEAP_CHANGE):
+                state.scalars[LEAPT] = 1.0
         block_before = s
 
 
@@ -219,6 +238,9 @@ def aid(navigators: Navigators, further: Further | None, inputs: Inputs, outputs
         window.open_at(state, plan, state.scalars[TIME], measurement[VALUE])
     elif kind == kinds.PAUSE:
         silence.add_noise(state, plan, measurement[VALUE : VALUE + 4])
+    elif kind == kinds.DEVIATIONS:
+        if deviations.compare(state, plan, work, outputs.innovations[j]):
+            status = update.ACCEPTED
     elif _complete(state, plan, measurement, kind):
         if kind != kinds.WHEEL_SPEED or slip.some_roll(state, plan):
             slip.leave_out(state, plan, measurement)
@@ -323,7 +345,9 @@ def write(state: State, plan: Plan, outputs: Outputs, further: Further | None, k
     variance = outputs.variances[k]
     for i in range(12):
         variance[i] = 0.0
-    if further is None:
+    if plan.settings[TOGETHER] != 0.0:
+        _add_variances(state.blocks[-1], stride, 1.0, variance)
+    elif further is None:
         for s in range(count):
             _add_variances(state.blocks[s], stride, 1.0 / count, variance)
     else:
@@ -359,14 +383,14 @@ def _add_joint_variances(square: Array, row: int, column: int, weight: float, va
 
 @scalar_kernel
 def _log(state: State, plan: Plan, outputs: Outputs, time: float) -> None:
-    row, stride = int(state.scalars[NEXT_LOG]), int(plan.settings[STRIDE])
+    row = int(state.scalars[NEXT_LOG])
     state.scalars[NEXT_LOG] += 1.0
     outputs.log_time[row] = time
     for s in range(plan.spans.shape[0]):
         for i in range(plan.spans[s, 0], plan.spans[s, 1]):
             for k in range(outputs.log.shape[2]):
                 outputs.log[row, 0, k, i] = state.rows[i // LANES, bank.ERRORS + k * LANES + i % LANES]
-                std = math.sqrt(covariance.variance(state.blocks[s], covariance.NAV + k, stride))
+                std = math.sqrt(deviations.variance(state, plan, s, covariance.NAV + k))
                 outputs.log[row, 1, k, i] = std
 
 

@@ -15,7 +15,7 @@ from polyins.model.methods import Method
 from polyins.model.recording import FilterOptions, Recording
 from polyins.model.rig import DEG, AidingSensor, Imu, NoiseGrade, Rig
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place, stride_for
-from polyins.navigate import receiver, slip
+from polyins.navigate import receiver, sharing, slip
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice
 from polyins.navigate.state import Navigators, Plan, State, empty_state, empty_work
@@ -111,15 +111,27 @@ def lay_out(
     merged = count > 1 or rig.has_wheels
     stride = stride_for(states_of(recording.rig))
     rows = -(-len(seats.members) // LANES)
-    memory, state = empty_state(rows, count, len(choice.speed), merged, stride, joined)
+    compared = sharing.compares(row, recording.options, choice.blocks)
+    memory, state = empty_state(
+        rows, count, len(choice.speed), merged=merged, stride=stride, joined=joined, compared=compared
+    )
     _fill_lanes(state.rows, seats, recording, start, rates)
     for s, (begin, end) in enumerate(seats.spans):
         _fill_block(state.blocks[s], seats.members[begin:end], recording, choice, start)
+    noise = np.array([sharing.noise_of(block) for block in state.blocks[:count]])
+    for s, (begin, end) in enumerate(seats.spans):
+        of = len(choice.blocks[0]) if row.bank == "mean" else end - begin
+        rotation = alignment.rotation_matrix(seats.members[begin].attitude)
+        sharing.share_out(state.blocks[s], state.deviations[s] if compared else None, of, recording.options, rotation)
     if joined and row.bank == "all":
         _share_start(state, count, stride)
+    plan = _plan(row, choice, seats, recording, rows, stride)._replace(noise=noise)
+    if row.bank == "all" and count > 1 and not joined and recording.options.common_share < 1.0:
+        plan.settings[places.TOGETHER] = 1.0
+        state.blocks[-1] = state.blocks[0]
+        sharing.share_out(state.blocks[-1], None, count, recording.options, np.eye(3))
     _fill_scalars(state.scalars, recording, start)
     state.silent[:2] = -1.0
-    plan = _plan(row, choice, seats, recording, rows, stride)
     return memory, Navigators(state, plan, empty_work(count, joined))
 
 
@@ -254,7 +266,13 @@ def _plan(row: Method, choice: Choice, seats: Bank, recording: Recording, rows: 
     settings[places.RADIUS] = wheels.mean_radius(recording.rig, choice.speed)
     settings[places.SPEED_AT_END] = rolling.predict == "end"
     taken = [i for block in choice.blocks for i in block]
+    settings[places.COMMON_SHARE] = options.common_share
+    settings[places.COMPARED_EVERY] = options.relative_interval or 0.0
+    settings[places.EXCLUDES] = options.exclusion
+    settings[places.HELD : places.HELD + 3] = np.square(sharing.HOLDS)
+    settings[places.ADAPTS] = options.own_noise == "auto"
     return Plan(
+        noise=np.empty((count, 0)),
         spans=np.array(seats.spans, dtype=np.int64),
         lenders=np.array([bodies[0] if bodies and s not in bodies else -1 for s in range(count)], dtype=np.int64),
         row_blocks=row_blocks,

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from polyins.aiding import kinds
 from polyins.errors import InputError
 from polyins.model.attitude import euler_angles, euler_variance
+from polyins.model.comparisons import Exclusion, exclusions
 from polyins.model.findings import Finding
 from polyins.model.methods import find_method
 from polyins.model.recording import AidingStream, FilterOptions, Recording, StartOptions
@@ -182,6 +183,15 @@ class Navigator:
         """What became of the measurements so far, by kind, as in a `Solution`."""
         wheels = outcome.speed_wheels(self._choice, self._recording.rig)
         return self._record.measurements(None if self._timeline is None else self._timeline.measured, wheels)
+
+    @property
+    def exclusions(self) -> tuple[Exclusion, ...]:
+        """Which IMUs did not count when, since they deviated from the others, so far."""
+        if self._timeline is None:
+            return ()
+        seats = self._timeline.run.bank
+        names = [seats.members[lane].imu.name for lane in seats.lanes]
+        return exclusions(self._record.comparisons(self._timeline.measured, seats.lanes), names)
 
     @property
     def span(self) -> tuple[float, float] | None:
@@ -552,7 +562,7 @@ class Navigator:
         aligned = Aligned(time, increments, (), np.zeros((len(time), len(self._taken)), dtype=bool))
         prepared = batch.lay_out(self.method, self._choice, self._recording, aligned, self.start, gaps=True)
         self._order, self._ended = prepared.order, None
-        self._schedule = batch.schedule_of(self._choice, self._recording, self.start)
+        self._schedule = batch.schedule_of(self.method, self._choice, self._recording, self.start)
         if math.isnan(self._record.interval):
             self._record.interval = float(time[1] - time[0])
         self._record.part = Segment(Windows(self._recording.rig, 1.0 / float(time[1] - time[0])))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from polyins.aiding import kinds
+from polyins.model.comparisons import NOBODY, Comparisons
 from polyins.model.rig import Rig
 from polyins.model.solution import Innovations
-from polyins.navigate import receiver, slip, update
+from polyins.navigate import deviations, receiver, slip, update
 from polyins.navigate.choice import Choice
 from polyins.navigate.state import INNOVATION, Inputs, Outputs
 
@@ -75,6 +78,26 @@ def innovations_of(rows: Array, wheels: tuple[str, ...]) -> dict[str, Innovation
             unit=kind.unit,
         )
     return found
+
+
+def comparisons_of(rows: Array, lanes: Sequence[int]) -> Comparisons:
+    """Return how the IMUs of blocks kept together; `lanes`: of the navigators."""
+    shown = rows[(rows[:, KIND] == kinds.DEVIATIONS) & (rows[:, STATUS] != update.UNUSED)]
+    told = shown[:, INNOVATIONS:]
+    place = {-1: NOBODY, **{lane: number for number, lane in enumerate(lanes)}}
+
+    def who(column: int) -> NDArray[np.int64]:
+        return np.array([place[int(lane)] for lane in told[:, column]], dtype=np.int64)
+
+    return Comparisons(
+        time=shown[:, TIME],
+        left_out=who(deviations.WHO),
+        taken_back=who(deviations.BACK),
+        statistic=told[:, deviations.STATISTIC],
+        by_gyro=told[:, deviations.GROUP] == deviations.ATTITUDE,
+        own_noise=told[:, deviations.SCALE],
+        mean_square=told[:, deviations.SQUARE],
+    )
 
 
 def _gained(rows: Array) -> Array:

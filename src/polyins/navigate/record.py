@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polyins.model.comparisons import NO_COMPARISONS, Comparisons
 from polyins.model.findings import Finding
 from polyins.model.methods import Method
 from polyins.model.recording import Recording
@@ -94,6 +96,11 @@ class Record:
         parts = [outcome.innovations_of(each, wheels) for each in (*self.ended, *(() if rows is None else (rows,)))]
         names = dict.fromkeys(name for part in parts for name in part)
         return {name: Innovations.joined([part[name] for part in parts if name in part]) for name in names}
+
+    def comparisons(self, rows: Array | None, lanes: Sequence[int]) -> Comparisons:
+        """Return how the IMUs of blocks kept together; `rows`: of the part that goes on, `lanes`: of the navigators."""
+        parts = [*self.ended, *(() if rows is None else (rows,))]
+        return Comparisons.joined([NO_COMPARISONS, *(outcome.comparisons_of(each, lanes) for each in parts)])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all but the findings, for a file."""

@@ -11,8 +11,8 @@ from polyins.kernels import bank, covariance, earth, fuse, vehicle
 from polyins.kernels.bank import LANES
 from polyins.kernels.covariance import NAV, P
 from polyins.kernels.jit import Array, scalar_kernel
-from polyins.navigate import window
-from polyins.navigate.state import COMPLETED, EARTH, MEASURED, STRIDE, Inputs, Plan, State, Work
+from polyins.navigate import deviations, window
+from polyins.navigate.state import COMPLETED, EARTH, MEASURED, STRIDE, TOGETHER, Inputs, Plan, State, Work
 from polyins.navigate.state import SILENT as NOTHING
 
 SILENT, RETURNED, PAUSED = 0, 1, 2
@@ -27,17 +27,27 @@ RESEED_POSITION, RESEED_VELOCITY, RESEED_TILT, RESEED_HEADING = 0.1, 0.2, 0.1, 0
 
 @scalar_kernel
 def weigh(state: State, plan: Plan, present: Array) -> None:
-    """Let those members count in the means of their block that have data, and those blocks in the merged state."""
+    """Let those members count in the means of their block that have data, and those blocks in the merged state.
+
+    One that is left out for how it deviates counts only where no other has data.
+    """
     for s in range(plan.spans.shape[0]):
         first, last = plan.spans[s, 0], plan.spans[s, 1]
-        measured, completed = 0, 0
+        measured, completed, agreeing = 0, 0, 0
         for i in range(first, last):
             measured += present[i] == MEASURED
             completed += present[i] == COMPLETED
+            agreeing += present[i] == MEASURED and state.rows[i // LANES, bank.EXCLUDED + i % LANES] == 0.0
         wanted = MEASURED if measured > 0 else COMPLETED if completed > 0 else NOTHING
         count = measured if measured > 0 else completed if completed > 0 else last - first
+        if agreeing > 0:
+            count = agreeing
         for i in range(first, last):
-            state.rows[i // LANES, bank.WEIGHT + i % LANES] = 1.0 / count if present[i] == wanted else 0.0
+            lanes, lane = state.rows[i // LANES], i % LANES
+            counts = present[i] == wanted and (agreeing == 0 or lanes[bank.EXCLUDED + lane] == 0.0)
+            lanes[bank.WEIGHT + lane] = 1.0 / count if counts else 0.0
+        if state.deviations.shape[0] > 0 and count != state.blocks[s, covariance.MEMBERS]:
+            deviations.recount(state, plan, s, count)
         state.blocks[s, covariance.COUNTS] = 1.0 if measured > 0 and state.silent[SILENT, s] < 0.0 else 0.0
 
 
@@ -100,6 +110,8 @@ def add_noise(state: State, plan: Plan, variances: Array) -> None:
     A block that is still silent remembers it until it measures again.
     """
     stride = int(plan.settings[STRIDE])
+    for i in range(NAV if plan.settings[TOGETHER] != 0.0 else 0):
+        state.blocks[-1, P + i * (stride + 1)] += variances[3] if i == NAV - 1 else variances[i // 3]
     for s in range(plan.spans.shape[0]):
         for i in range(NAV):
             noise = variances[3] if i == NAV - 1 else variances[i // 3]
@@ -213,15 +225,12 @@ def _reseed(state: State, s: int, stride: int) -> None:
     """Begin anew with what the vehicle says of a block; what is known of its IMU's errors stays."""
     block = state.blocks[s]
     covariance.complete(block, stride)
-    for i in range(NAV):
-        for j in range(stride):
-            block[P + i * stride + j] = 0.0
-            block[P + j * stride + i] = 0.0
     noise = state.silent[PAUSED : PAUSED + 4, s]
     for k in range(3):
-        block[P + k * (stride + 1)] = RESEED_POSITION**2 + noise[0]
-        block[P + (3 + k) * (stride + 1)] = RESEED_VELOCITY**2 + noise[1]
-        block[P + (6 + k) * (stride + 1)] = RESEED_HEADING**2 + noise[3] if k == 2 else RESEED_TILT**2 + noise[2]
+        covariance.begin_anew(block, k, RESEED_POSITION**2 + noise[0], stride)
+        covariance.begin_anew(block, 3 + k, RESEED_VELOCITY**2 + noise[1], stride)
+        heading = RESEED_HEADING**2 + noise[3]
+        covariance.begin_anew(block, 6 + k, heading if k == 2 else RESEED_TILT**2 + noise[2], stride)
     noise[:] = 0.0
     for i in range(NAV):
         for j in range(state.joint.shape[0]):

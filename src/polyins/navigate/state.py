@@ -27,6 +27,8 @@ NEXT_EVENT = _take(1)  # its index
 NEXT_LOG = _take(1)  # row of the log
 REJECTED_AT = _take(1)  # time of the last GNSS position that was not taken as it is, s
 RECEIVER = _take(71)  # how far its positions are believed, see `navigate.receiver`
+LEAPT = _take(1)  # whether one IMU has moved the mean of its block in the last epoch
+LEFT_OUT = _take(5)  # what is yet to be told of the IMU that such a leap has left out, see `navigate.deviations`
 AT_REST = _take(1)  # whether the vehicle stood in the last window
 WINDOW_BEGIN = _take(1)  # s; of the window over which a mean speed or rate is taken
 WINDOW_FILLED = _take(1)  # epochs in it; below zero: none is open
@@ -56,8 +58,14 @@ SCALARS = _layout.size
     STILL_RATE,  # rad/s: an IMU that turns more does not stand
     RADIUS,  # m, mean of the wheels that give the speed
     SPEED_AT_END,  # predict the velocity at the end of a window instead of the mean
-) = range(10)
-SETTINGS = 10
+    COMMON_SHARE,  # of the variances of noise and slow errors, what members of a block have in common
+    COMPARED_EVERY,  # s between comparisons of members with their mean
+    EXCLUDES,  # whether a member that deviates from the others counts no more
+    ADAPTS,  # whether the own noise follows from how members deviate
+    TOGETHER,  # whether the covariance of the mean of all blocks is kept, see `navigate.together`
+    HELD,  # three variances: how well members keep together in position, velocity and attitude
+) = range(16)
+SETTINGS = 18
 
 INNOVATION = 11
 """numbers that are told of an event"""
@@ -76,6 +84,8 @@ class State(NamedTuple):
     """the bank, (rows of eight lanes, bank.SIZE)"""
     blocks: Array
     """covariance blocks, and behind them the merged state unless a single block has it, (., see block_size)"""
+    deviations: Array
+    """(blocks, .): of each the covariance D of how members deviate, see `navigate.deviations`; (0, .): none do"""
     joint: Array
     """covariance of all blocks together, square; empty unless they are joined"""
     scalars: Array
@@ -95,6 +105,8 @@ class Plan(NamedTuple):
     """int64 (blocks,): the block that lends roll and pitch; -1: none, or on the body"""
     row_blocks: Array
     """int64 (rows,): the block of several IMUs that a row belongs to; -1: blocks of one"""
+    noise: Array
+    """(blocks, covariance.NOISES): of one member of each"""
     speed_variance: Array
     """(blocks, 3): of the velocity that wheels give, (m/s)^2 forward, right, down"""
     wheels: Array
@@ -152,9 +164,11 @@ class Work(NamedTuple):
     sums: Array
     """(blocks, .), see `fuse`"""
     updates: Array
-    """(blocks, kalman.SIZE)"""
+    """(blocks + 1, kalman.SIZE): the last is of all together"""
     measurement: Array
     """(measurement.SIZE,)"""
+    told: Array
+    """(INNOVATION,): what a comparison says that is no event"""
     noise: Array
     """(3,): the variances with which an innovation was recorded"""
     residuals: Array
@@ -189,12 +203,15 @@ def block_size(stride: int) -> int:
     return -(-(covariance.P + stride * stride) // EIGHT) * EIGHT
 
 
-def empty_state(rows: int, blocks: int, wheels: int, merged: bool, stride: int, joined: bool) -> tuple[Array, State]:
+def empty_state(
+    rows: int, blocks: int, wheels: int, *, merged: bool, stride: int, joined: bool, compared: bool
+) -> tuple[Array, State]:
     """Return the array of all that a run remembers, and the parts of it, which are zero."""
     joint = blocks * stride if joined else 0
     shapes = (
         (rows, bank.SIZE),
         (blocks + merged, block_size(stride)),
+        (blocks if compared else 0, block_size(stride)),
         (joint, joint),
         (SCALARS,),
         (6, blocks),
@@ -214,8 +231,9 @@ def empty_work(blocks: int, joined: bool) -> Work:
     return Work(
         covariance=layout.zeros(blocks if joined else 1, covariance.WORK),
         sums=layout.zeros(blocks, fuse.SUMS),
-        updates=layout.zeros(blocks, kalman.SIZE),
+        updates=layout.zeros(blocks + 1, kalman.SIZE),
         measurement=layout.zeros(measurement.SIZE),
+        told=layout.zeros(INNOVATION),
         noise=layout.zeros(3),
         residuals=np.zeros((blocks, 8)),
     )

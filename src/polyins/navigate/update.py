@@ -12,9 +12,9 @@ from polyins.aiding import kinds, vehicle_attitude
 from polyins.aiding.measurement import KIND, METRIC, VARIANCE
 from polyins.kernels import bank, covariance, earth, fuse, joint, kalman, strapdown, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.covariance import LARGEST, P
+from polyins.kernels.covariance import LARGEST
 from polyins.kernels.jit import Array, scalar_kernel
-from polyins.navigate import receiver, window
+from polyins.navigate import receiver, together, window
 from polyins.navigate.state import (
     EARTH,
     GATE_LIMIT,
@@ -23,6 +23,7 @@ from polyins.navigate.state import (
     SLIP_TRUSTED,
     STRIDE,
     TIME,
+    TOGETHER,
     Further,
     Plan,
     State,
@@ -346,27 +347,26 @@ def _passes_with_caution(work: Work, rows: int, limit: float) -> bool:
 @scalar_kernel
 def _reset_each(state: State, plan: Plan, work: Work, rows: int) -> None:
     """Set the position of every block to what is measured, and how sure it is; nothing else follows from it."""
-    stride = int(plan.settings[STRIDE])
     for row in range(rows):
         s = int(work.residuals[row, OWNER])
-        block, residual = state.blocks[s], work.updates[s, kalman.RESIDUAL : kalman.RESIDUAL + 3]
-        covariance.complete(block, stride)
-        for a in range(kalman.ROWS):
-            if not work.noise[a] > 0.0:
-                continue
-            for j in range(stride):
-                block[P + a * stride + j] = 0.0
-                block[P + j * stride + a] = 0.0
-            block[P + a * (stride + 1)] = work.noise[a]
-        speed_variance = state.scalars[RECEIVER + receiver.SPEED_VARIANCE]
-        for a in range(3, 6):
-            if speed_variance > 0.0:
-                for j in range(stride):
-                    block[P + a * stride + j] = 0.0
-                    block[P + j * stride + a] = 0.0
-                block[P + a * (stride + 1)] = speed_variance
-        _shift(state, plan, s, residual, work.noise)
+        _forget(state, plan, work, state.blocks[s])
+        _shift(state, plan, s, work.updates[s, kalman.RESIDUAL : kalman.RESIDUAL + 3], work.noise)
+    if plan.settings[TOGETHER] != 0.0:
+        _forget(state, plan, work, state.blocks[-1])
     update_derived(state, plan, work)
+
+
+@scalar_kernel
+def _forget(state: State, plan: Plan, work: Work, block: Array) -> None:
+    """Let a block be as sure of its position as what it is set to, and of its velocity as the receiver has shown."""
+    stride, speed_variance = int(plan.settings[STRIDE]), state.scalars[RECEIVER + receiver.SPEED_VARIANCE]
+    covariance.complete(block, stride)
+    for a in range(kalman.ROWS):
+        if work.noise[a] > 0.0:
+            covariance.begin_anew(block, a, work.noise[a], stride)
+    for a in range(3, 6):
+        if speed_variance > 0.0:
+            covariance.begin_anew(block, a, speed_variance, stride)
 
 
 @scalar_kernel
@@ -408,7 +408,7 @@ def _shift(state: State, plan: Plan, s: int, residual: Array, noise: Array) -> N
         for a in range(kalman.ROWS):
             if noise[a] > 0.0:
                 lanes[bank.CORRECTION + a * LANES + lane] = residual[a]
-    _feed_back(state, plan, s)
+    feed_back(state, plan, s)
 
 
 # --- what it corrects -------------------------------------------------------------------------------------------------
@@ -416,23 +416,31 @@ def _shift(state: State, plan: Plan, s: int, residual: Array, noise: Array) -> N
 
 @scalar_kernel
 def _correct_each(state: State, plan: Plan, work: Work) -> None:
-    """Correct each member by its own residual times the gain of its block, dx = K z, paper A (11)."""
+    """Correct each member by its own residual times the gain of its block, dx = K z, paper A (11).
+
+    Where members are compared with their mean all are corrected by its residual.
+    """
+    alike = state.deviations.shape[0] > 0
     for s in range(plan.spans.shape[0]):
         if state.silent[0, s] >= 0.0:
             continue
         update = work.updates[s]
         kalman.update_covariance(state.blocks[s], update, int(plan.settings[STRIDE]))
         for i in range(plan.spans[s, 0], plan.spans[s, 1]):
-            member_correction(state.rows[i // LANES], i % LANES, update, int(plan.settings[STRIDE]))
-        _feed_back(state, plan, s)
+            member_correction(state.rows[i // LANES], i % LANES, update, int(plan.settings[STRIDE]), alike)
+        feed_back(state, plan, s)
+    if plan.settings[TOGETHER] != 0.0:
+        together.correct(state, plan, work)
     update_derived(state, plan, work)
 
 
 @scalar_kernel
-def member_correction(lanes: Array, lane: int, update: Array, stride: int) -> None:
-    """Write K z of one member, whose residual is its own."""
+def member_correction(lanes: Array, lane: int, update: Array, stride: int, alike: bool) -> None:
+    """Write K z of one member, whose residual is its own, or that of all together."""
     r = bank.RESIDUAL + lane
     z0, z1, z2 = lanes[r], lanes[r + LANES], lanes[r + 2 * LANES]
+    if alike:
+        z0, z1, z2 = update[kalman.RESIDUAL], update[kalman.RESIDUAL + 1], update[kalman.RESIDUAL + 2]
     for k in range(min(stride, bank.STATES)):
         n = kalman.K + kalman.ROWS * k
         lanes[bank.CORRECTION + k * LANES + lane] = update[n] * z0 + update[n + 1] * z1 + update[n + 2] * z2
@@ -464,7 +472,7 @@ def _correct_joint(state: State, plan: Plan, work: Work, further: Further, rows:
     joint.scatter(state.blocks, plan.spans.shape[0], state.joint, stride)
     for s in range(plan.spans.shape[0]):
         if state.silent[0, s] < 0.0:
-            _feed_back(state, plan, s)
+            feed_back(state, plan, s)
     update_derived(state, plan, work)
 
 
@@ -497,7 +505,7 @@ def _add_corrections(state: State, plan: Plan, further: Further, residual: Array
 
 
 @scalar_kernel
-def _feed_back(state: State, plan: Plan, s: int) -> None:
+def feed_back(state: State, plan: Plan, s: int) -> None:
     """Apply the correction of each member of a block to its state."""
     block = state.blocks[s]
     metres = block[covariance.METRIC : covariance.METRIC + 3]

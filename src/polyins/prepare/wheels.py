@@ -62,27 +62,31 @@ class Schedule:
     Epochs come in pieces of any length.
     """
 
-    def __init__(self, start: float, options: FilterOptions, *, wheels: bool, several: bool) -> None:
-        """`start`: s; `wheels`: whether some give the speed; `several`: whether there are several blocks to compare."""
+    def __init__(self, start: float, options: FilterOptions, *, wheels: bool, several: bool, compared: bool) -> None:
+        """`start`: s; `wheels`: whether some give the speed; `several`: whether there are several blocks to compare.
+
+        `compared`: whether the IMUs of a block are compared with their mean.
+        """
         self._options = options.rolling
         self._assumed = options.nonholonomic
         self._rest = None if wheels else options.standstill
         self._wheels = wheels
         self._several = several
-        self._last_speed = self._last_point = self._last_assumed = start
+        self._compared = options.relative_interval if compared else None
+        self._last_speed = self._last_point = self._last_assumed = self._last_compared = start
         self._open = False
         if self._rest is not None:
             # the first window begins at once, as long as it is known that a start is one at rest
             self._last_speed = start - self._rest.interval
 
     @property
-    def memory(self) -> tuple[float, float, float, bool]:
-        """When it last measured speed, reference point and no slip, s, and whether a window is open."""
-        return self._last_speed, self._last_point, self._last_assumed, self._open
+    def memory(self) -> tuple[float, float, float, float, bool]:
+        """When it last measured speed, reference point and no slip, compared IMUs, s, and whether a window is open."""
+        return self._last_speed, self._last_point, self._last_assumed, self._last_compared, self._open
 
     @memory.setter
-    def memory(self, value: tuple[float, float, float, bool]) -> None:
-        self._last_speed, self._last_point, self._last_assumed, self._open = value
+    def memory(self, value: tuple[float, float, float, float, bool]) -> None:
+        self._last_speed, self._last_point, self._last_assumed, self._last_compared, self._open = value
 
     def events(self, time: Array, intervals: Array, lateral: Array) -> Scheduled:
         """Return what is due in further epochs: stamps, s, their intervals, and the place of the speed there, (T,)."""
@@ -90,11 +94,13 @@ class Schedule:
         reach = np.maximum.accumulate(time + 0.5 * np.minimum(intervals, LONGEST))
         found = self._speeds(time, reach, lateral) if self._wheels else []
         if self._several:
-            found += self._points(time, reach)
+            found += self._every(time, reach, "_last_point", self._options.constraint_interval, kinds.REFERENCE_POINT)
         if self._rest is not None:
             found += self._rests(time, reach, self._rest.interval)
         if self._assumed is not None:
-            found += self._no_slips(time, reach, self._assumed.interval)
+            found += self._every(time, reach, "_last_assumed", self._assumed.interval, kinds.ODOMETER)
+        if self._compared is not None:
+            found += self._every(time, reach, "_last_compared", self._compared, kinds.DEVIATIONS)
         return sorted(found, key=lambda event: event[0])
 
     def _speeds(self, time: Array, reach: Array, lateral: Array) -> Scheduled:
@@ -117,20 +123,13 @@ class Schedule:
                 self._open = True
                 k += 1
 
-    def _points(self, time: Array, reach: Array) -> Scheduled:
-        found: Scheduled = []
-        k, every = -1, self._options.constraint_interval
-        while (k := max(k + 1, int(np.searchsorted(reach, self._last_point + every)))) < len(time):
-            found.append((k, kinds.REFERENCE_POINT, 0.0))
-            self._last_point = float(time[k])
-        return found
-
-    def _no_slips(self, time: Array, reach: Array, interval: float) -> Scheduled:
+    def _every(self, time: Array, reach: Array, last: str, interval: float, kind: int) -> Scheduled:
+        """Return events of a kind, one each interval after the one whose time the attribute `last` has."""
         found: Scheduled = []
         k = -1
-        while (k := max(k + 1, int(np.searchsorted(reach, self._last_assumed + interval)))) < len(time):
-            found.append((k, kinds.ODOMETER, 0.0))
-            self._last_assumed = float(time[k])
+        while (k := max(k + 1, int(np.searchsorted(reach, getattr(self, last) + interval)))) < len(time):
+            found.append((k, kind, 0.0))
+            setattr(self, last, float(time[k]))
         return found
 
     def _rests(self, time: Array, reach: Array, interval: float) -> Scheduled:

@@ -39,7 +39,9 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
         scenario = full.model_copy(update={"rate_hz": QUICK_RATE_HZ}) if quick else full
         figures: dict[str, list[float]] = {method: [] for method in ("single", *METHODS)}
         for seed in range(seeds):
-            document = compare(simulate(scenario, seed=seed), ("single", *METHODS), progress=update).document
+            document = compare(
+                simulate(scenario, seed=seed).as_published(), ("single", *METHODS), progress=update
+            ).document
             for method, values in figures.items():
                 value = figure(document["methods"][method])
                 assert value is not None  # there are outages and a reference

@@ -60,16 +60,16 @@ def reproduce(quick: bool = False, progress: Callable[[float], None] | None = No
     rows = list_flights(folder)[:: 4 if quick else 1]
     outages: list[Outage] = []
     for number, row in enumerate(rows):
-        outages += fly(flight(folder, row), row)
+        outages += fly(flight(folder, row).as_published(), row)
         if progress:
             progress((number + 1) / len(rows))
     return {
         "target": "flights",
         "paper": {},
         "polyins": {
-            **_table(outages),
-            "by_session": {name: _table(group) for name, group in _grouped(outages, "session")},
-            "by_flight": {name: _table(group) for name, group in _grouped(outages, "flight")},
+            **by_length(outages),
+            "by_session": {name: by_length(group) for name, group in _grouped(outages, "session")},
+            "by_flight": {name: by_length(group) for name, group in _grouped(outages, "flight")},
             "by_imus": {str(count): _rms(outages, 10, f"imus-{count}") for count in (1, 2, 3, 4)},
         },
         "settings": {
@@ -196,7 +196,8 @@ def _maximum(run: Recording, solution: Solution, begin: float, end: float) -> fl
     return float(errors.horizontal[inside].max())
 
 
-def _table(outages: list[Outage]) -> dict[str, dict[str, float | int | None]]:
+def by_length(outages: list[Outage]) -> dict[str, dict[str, Any]]:
+    """Return the rms of the maxima of each method, m, by the length of the outages."""
     return {
         f"outage_{length}s": {
             "count": sum(length in outage.maxima for outage in outages),

@@ -70,7 +70,7 @@ def group_chips(number: int, count: int) -> Chips:
 
 def recording_of(run: TrueRun, seed: int) -> Recording:
     """Return a recording with errors that the seed draws."""
-    return record(run, seed=seed).recording.without_gate()
+    return record(run, seed=seed).recording.as_published().without_gate()
 
 
 def unaware(recording: Recording) -> Recording:
