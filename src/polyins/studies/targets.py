@@ -27,6 +27,13 @@ TARGETS = (
         seconds=(30, 250),
         print_tables="polyins.studies.clocks:print_tables",
     ),
+    Target(
+        "beyond",
+        "polyins.studies.beyond.table:reproduce",
+        datasets=("quadrotor",),
+        seconds=(110, 1500),
+        print_tables="polyins.studies.beyond.table:print_tables",
+    ),
     Target("consistency", "polyins.studies.consistency:reproduce"),
     Target(
         "starts",
