@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.reference_filter import Ellipsoid, State, error_dynamics, gain, joseph, noise_density, position_design
+from reference_filter import Ellipsoid, State, error_dynamics, gain, joseph, noise_density, position_design
 
 from polyins.aiding import kinds
 from polyins.kernels import bank, covariance

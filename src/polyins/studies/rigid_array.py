@@ -13,6 +13,7 @@ from polyins.errors import InputError
 from polyins.evaluation.errors import compare_to_reference
 from polyins.evaluation.outages import outage_statistic
 from polyins.model.recording import Recording
+from polyins.model.solution import Solution
 from polyins.navigate import batch
 from polyins.reading import datasets
 from polyins.simulation.error_scenario import SensorErrors
@@ -87,7 +88,11 @@ def compensated(recording: Recording, chips: Chips) -> Recording:
 
 def maxima(recording: Recording, method: str, *, imu: int = 0) -> Array:
     """Return the maximum horizontal error in each outage, m."""
-    solution = batch.run(recording, method, imu=imu)
+    return maxima_of(batch.run(recording, method, imu=imu), recording)
+
+
+def maxima_of(solution: Solution, recording: Recording) -> Array:
+    """Return the maximum horizontal error of a solution in each outage, m."""
     assert recording.reference is not None
     errors = compare_to_reference(solution, recording.reference)
     each = outage_statistic(errors, recording.outages)["each_m"]

@@ -13,7 +13,7 @@ from polyins.model.rig import DEG
 from polyins.navigate import batch
 from polyins.simulation.run import simulate_with_truth
 from polyins.studies.beyond.drives import METHOD, compared_every, of_some, scenario
-from polyins.studies.rigid_array import maxima, rms
+from polyins.studies.rigid_array import maxima, maxima_of, rms
 
 Array = NDArray[np.float64]
 
@@ -100,8 +100,9 @@ def _with_fault(recording: Recording, change: Callable[[Array, slice, float], No
 
 def _outcome(recording: Recording, best: float) -> dict[str, float | None]:
     own = recording.rig.imus[FAULTY].name
-    found = [one for one in batch.run(recording, METHOD).exclusions if one.imu == own]
+    solution = batch.run(recording, METHOD)
+    found = [one for one in solution.exclusions if one.imu == own]
     return {
         "found_s": found[0].from_s - BEGINS if found else None,
-        "error_over_rest": rms(maxima(recording, METHOD)) / best,
+        "error_over_rest": rms(maxima_of(solution, recording)) / best,
     }
