@@ -15,7 +15,9 @@ from polyins.kernels import bank, covariance
 from polyins.kernels.bank import LANES
 from polyins.model.geodesy import metres_per_unit
 from polyins.model.recording import Recording
-from polyins.model.rig import NoiseGrade
+from polyins.model.rig import AidingSensor, NoiseGrade
+from polyins.model.solution import Solution
+from polyins.model.states import NAVIGATION, place, stride_for
 from polyins.navigate import batch, sharing
 from polyins.simulation.run import simulate
 from polyins.simulation.scenario import Board, Scenario
@@ -253,3 +255,55 @@ def test_the_mean_is_surer_of_its_heading_than_one_imu() -> None:
     for solution in (ours, apart):
         ratio = np.sqrt(solution.phi_covariance[at, 5] / paper.phi_covariance[at, 5])
         assert np.all(ratio < 0.9)
+
+
+def test_states_that_are_not_of_the_imus_stay_as_they_are() -> None:
+    """An IMU less and noise that adapts change nothing of an offset of another sensor, of a mount or of its std."""
+    healthy = recording(4, seconds=60.0, common=0.0)
+    rig = replace(healthy.rig, sensors=(AidingSensor("height", offset_std=1.0, offset_random_walk=0.1),))
+    sick = replace(with_bias(healthy, 1, 30.0, np.inf, 0.0035), rig=rig)
+    run = batch.prepare(sick, "enav-fusion")
+    solution = batch.navigate(run)
+    assert len(solution.exclusions) == 1
+    block = run.state.blocks[0]
+    assert block[covariance.ERROR_PSD + place("height_bias") - NAVIGATION] == pytest.approx(0.01)
+    completed = block.copy()
+    covariance.complete(completed, stride_for(place("height_bias") + 1))
+    p = sharing.square_of(completed)
+    between = slice(place("speed_scale"), place("height_bias"))
+    np.testing.assert_array_equal(p[between], 0.0)
+    np.testing.assert_array_equal(p[:, between], 0.0)
+    np.testing.assert_array_equal(members(run, bank.MOUNT, 2), 0.0)
+    (height,) = solution.offsets.values()
+    np.testing.assert_allclose(height.std, np.sqrt(1.0 + 0.01 * (height_times(solution))), rtol=1e-6)
+
+
+def height_times(solution: Solution) -> Array:
+    """s since the start, of the log."""
+    return solution.imu_error_time - float(solution.start["time_s"])  # type: ignore[arg-type]
+
+
+def test_an_imu_whose_samples_leap_is_left_out_at_once() -> None:
+    healthy = recording(4, seconds=40.0, common=0.0, relative_interval=5.0)
+    stream = healthy.imus[2]
+    dtheta = stream.dtheta.copy()
+    begins = int(np.searchsorted(stream.time, 31.0))
+    dtheta[begins:, 0] += 0.2
+    leaping = replace(healthy, imus=(*healthy.imus[:2], replace(stream, dtheta=dtheta), *healthy.imus[3:]))
+    solution, as_healthy = batch.run(leaping, "enav-fusion"), batch.run(healthy, "enav-fusion")
+    assert [one.imu for one in solution.exclusions] == [healthy.rig.imus[2].name]
+    turned = np.abs(solution.attitude - as_healthy.attitude).max()
+    assert turned < 0.01
+
+
+def test_vibration_does_not_adapt_faster_than_time_goes() -> None:
+    """Leaps bring comparisons forward; the scale of the noise follows those that are due."""
+    healthy = recording(4, seconds=40.0, common=0.0, exclusion=False)
+    rng = np.random.default_rng(4)
+    shaken = tuple(
+        replace(one, dvel=one.dvel + rng.normal(0.0, 1.5, one.dvel.shape) * (one.time > 38.0)[:, None])
+        for one in healthy.imus
+    )
+    found = batch.run(replace(healthy, imus=shaken), "enav-fusion").comparisons
+    late = found.own_noise[found.time > 38.5]
+    assert 1.0 < late.max() < found.own_noise[found.time < 38.0][-1] * 4.0 ** (4.0 * len(late) / 30.0)

@@ -1,8 +1,10 @@
 """Folders of the real recordings that several files read."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
+from ruamel.yaml import YAML
 
 
 @pytest.fixture(scope="session")
@@ -12,3 +14,16 @@ def logs(data_folder: Path) -> Path:
     if not folder.is_dir():
         pytest.skip(f"no logs: {folder} is not a folder")
     return folder
+
+
+@pytest.fixture(scope="session")
+def cases(logs: Path) -> Path:
+    """Made inputs with their right answers."""
+    return logs / "cases"
+
+
+@pytest.fixture(scope="session")
+def expected(cases: Path) -> dict[str, Any]:
+    """The right answers."""
+    found: dict[str, Any] = YAML(typ="safe").load(cases / "expected.yaml")
+    return found

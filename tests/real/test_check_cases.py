@@ -6,23 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ruamel.yaml import YAML
 
 from polyins.config.yaml_document import read_yaml, write_yaml
 from polyins.model.findings import Finding
 from polyins.reading.loading import load
 from polyins.tools.check import Checked, check, write_fixed
-
-
-@pytest.fixture(scope="module")
-def cases(logs: Path) -> Path:
-    return logs / "cases"
-
-
-@pytest.fixture(scope="module")
-def expected(cases: Path) -> dict[str, Any]:
-    found: dict[str, Any] = YAML(typ="safe").load(cases / "expected.yaml")
-    return found
 
 
 def kinds(checked: Checked, *severities: str) -> list[str]:

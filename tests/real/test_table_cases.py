@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ruamel.yaml import YAML
 
 from polyins import cli
 from polyins.errors import InputError
@@ -23,17 +22,6 @@ from polyins.tools.propose.proposal import propose
 
 HALF_DIGIT = 1.0 + 1e-6
 """of the last one that a file has"""
-
-
-@pytest.fixture(scope="module")
-def cases(logs: Path) -> Path:
-    return logs / "cases"
-
-
-@pytest.fixture(scope="module")
-def expected(cases: Path) -> dict[str, Any]:
-    found: dict[str, Any] = YAML(typ="safe").load(cases / "expected.yaml")
-    return found
 
 
 @pytest.fixture(scope="module")

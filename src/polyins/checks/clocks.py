@@ -9,6 +9,7 @@ import numpy as np
 
 from polyins.checks.diagnosis import Diagnosis
 from polyins.checks.evidence import Evidence
+from polyins.checks.fix_scatter import FIXES
 from polyins.config.yaml_document import Setting
 from polyins.errors import ImplausibleError
 from polyins.model.findings import Finding
@@ -42,7 +43,7 @@ NEAR_S = 0.4
 """of whole seconds"""
 LEAST_LEAP = 2.0
 """s: shorter delays are those of receivers"""
-FIXES, DELAY = "GNSS position", "delay"
+DELAY = "delay"
 
 
 def find(evidence: Evidence) -> Iterator[Diagnosis]:

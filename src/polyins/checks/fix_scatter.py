@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polyins.checks.diagnosis import Diagnosis
 from polyins.checks.evidence import Evidence
 from polyins.config.yaml_document import Setting
 from polyins.model.findings import Finding
 from polyins.model.geodesy import displacement
+
+Array = NDArray[np.float64]
 
 LONGEST_S = 0.5
 LEAST_FIXES = 40
@@ -41,11 +44,16 @@ def find(evidence: Evidence) -> Iterator[Diagnosis]:
     ratio = float(np.max(std / np.median(gnss.position_std, axis=0)))
     if ratio < NOISY:
         return
-    right = [float(f"{value:.2g}") for value in np.maximum(std, np.median(gnss.position_std, axis=0))]
-    yield Diagnosis(
+    yield noisier(ratio, np.maximum(std, np.median(gnss.position_std, axis=0)), ", beside its velocities")
+
+
+def noisier(ratio: float, std: Array, by: str = "") -> Diagnosis:
+    """Return the diagnosis that fixes are noisier than stated; `std`: what they have, m, shape (3,), `by`: by what."""
+    right = [float(f"{value:.2g}") for value in std]
+    return Diagnosis(
         Finding(
             "noise",
-            f"{FIXES}: {ratio:.1f} times as noisy from fix to fix as stated, beside its velocities",
+            f"{FIXES}: {ratio:.1f} times as noisy from fix to fix as stated{by}",
             "doubt",
             stream=FIXES,
             size=ratio,

@@ -8,6 +8,7 @@ import numpy as np
 
 from polyins.checks.diagnosis import Diagnosis
 from polyins.checks.evidence import Evidence
+from polyins.checks.fix_scatter import FIXES
 from polyins.config.yaml_document import Setting
 from polyins.model.findings import Finding
 
@@ -41,7 +42,7 @@ def find(evidence: Evidence) -> Iterator[Diagnosis]:
             f"GNSS position: its heights are {abs(size):.1f} m {'below' if size > 0.0 else 'above'} those of the "
             "reference all along: one counts from the sea, the other from the ellipsoid",
             "doubt",
-            stream="GNSS position",
+            stream=FIXES,
             axis="height",
             size=size,
             expected=0.0,

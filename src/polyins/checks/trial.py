@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from polyins.checks.diagnosis import Diagnosis
 from polyins.checks.evidence import Evidence
+from polyins.checks.fix_scatter import FIXES, NOISY, noisier
 from polyins.config.yaml_document import Setting
 from polyins.errors import InputError
 from polyins.model.findings import Finding
@@ -39,9 +40,6 @@ UNSURE = np.array([0.3, 0.3, 0.3, 0.1])
 """std, m, s, from which a component is not told"""
 BETTER = 0.9
 """times the squares of the innovations with the arm as stated, that those with another one have at most"""
-NOISY = 3.0
-"""times what a receiver states"""
-FIXES = "GNSS position"
 
 
 @dataclass(frozen=True)
@@ -206,17 +204,4 @@ def _noise(recording: Recording) -> Iterator[Diagnosis]:
     ratio = float(np.sqrt(np.median(measured.noise_ratio)))
     if ratio < NOISY:
         return
-    std = np.median(recording.gnss.position_std, axis=0) * ratio
-    right = [float(f"{value:.2g}") for value in std]
-    yield Diagnosis(
-        Finding(
-            "noise",
-            f"{FIXES}: {ratio:.1f} times as noisy from fix to fix as stated",
-            "doubt",
-            stream=FIXES,
-            size=ratio,
-            expected=1.0,
-            remedy=f"gnss.position_std_m: [{', '.join(f'{value:g}' for value in right)}]",
-        ),
-        (Setting(("gnss", "position_std_m"), right),),
-    )
+    yield noisier(ratio, np.median(recording.gnss.position_std, axis=0) * ratio)

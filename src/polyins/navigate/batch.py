@@ -21,7 +21,7 @@ from polyins.model.rig import Rig
 from polyins.model.solution import OffsetEstimate, Solution, Trajectory
 from polyins.model.states import IMU_ERRORS, NAVIGATION, place
 from polyins.model.status import USUAL, status_of
-from polyins.navigate import bridging, engine, events, layout, outcome, receiver, restart, sharing
+from polyins.navigate import bridging, deviations, engine, events, layout, outcome, receiver, restart, sharing
 from polyins.navigate import start as search
 from polyins.navigate import state as places
 from polyins.navigate.choice import Choice, choose
@@ -176,10 +176,10 @@ def known(run: Prepared, last: int, *, ended: str = "") -> restart.Known:
 
 def _imu_errors(run: Prepared) -> dict[str, tuple[Array, Array]]:
     """Return what a run has found of its IMUs, and the std of it."""
-    state, stride = run.state, int(run.plan.settings[places.STRIDE])
+    state = run.state
     errors = {}
     for s, (begin, end) in enumerate(run.bank.spans):
-        std = np.sqrt([covariance.variance(state.blocks[s], covariance.NAV + k, stride) for k in range(IMU_ERRORS)])
+        std = np.sqrt([deviations.variance(state, run.plan, s, covariance.NAV + k) for k in range(IMU_ERRORS)])
         for lane in range(begin, end):
             first = bank.ERRORS + lane % LANES
             own = state.rows[lane // LANES, first : first + IMU_ERRORS * LANES : LANES].copy()

@@ -16,7 +16,7 @@ import math
 
 from polyins.kernels import bank, covariance, earth, kalman, vehicle
 from polyins.kernels.bank import LANES
-from polyins.kernels.covariance import LARGEST, NAV, RATE, P
+from polyins.kernels.covariance import INERTIAL, LARGEST, NAV, RATE, P
 from polyins.kernels.jit import Array, scalar_kernel
 from polyins.model.states import place
 from polyins.navigate import update
@@ -62,13 +62,13 @@ FASTEST_GROWTH = 4.0
 
 LEAP_TURN, LEAP_CHANGE = 0.002, 0.2
 """rad, m/s, by which one IMU moves the mean in an epoch: then all are compared at once"""
-TOLD = 4
+TOLD = 3
 """of `scalars[LEFT_OUT]`: whether something is yet to be told"""
 
-WHO, STATISTIC, LENGTH, GROUP, BACK, SCALE, SQUARE = range(7)
-"""places in a row of `Outputs.innovations`: the lane that counts no more, or -1; by how much over the limit; in which
-of the three lengths; whether position, velocity or attitude; the lane that counts again, or -1; the scale of the own
-noise; and the mean square of the deviations over what is expected"""
+WHO, STATISTIC, GROUP, BACK, SCALE, SQUARE = range(6)
+"""places in a row of `Outputs.innovations`: the lane that counts no more, or -1; by how much over the limit; whether
+position, velocity or attitude; the lane that counts again, or -1; the scale of the own noise; and the mean square of
+the deviations over what is expected"""
 
 
 @scalar_kernel
@@ -82,7 +82,9 @@ def share_noise(state: State, plan: Plan, s: int) -> None:
     together = common + alone / block[covariance.MEMBERS]
     for k in range(covariance.NOISES):
         own[k] = alone * plan.noise[s, k]
-        block[k] = together * plan.noise[s, k]
+        # what drives the offsets of other sensors is not of the IMUs
+        if plan.noise[s, k] != 0.0:
+            block[k] = together * plan.noise[s, k]
 
 
 @scalar_kernel
@@ -106,8 +108,10 @@ def recount(state: State, plan: Plan, s: int, count: int) -> None:
     covariance.complete(own, stride)
     more = 1.0 / count - 1.0 / block[covariance.MEMBERS]
     if more > 0.0:
-        for k in range(stride * stride):
-            block[P + k] += more * own[P + k]
+        # what D has beyond is how axes lie, where M has other states
+        for i in range(INERTIAL):
+            for j in range(INERTIAL):
+                block[P + i * stride + j] += more * own[P + i * stride + j]
     block[covariance.MEMBERS] = count
     share_noise(state, plan, s)
 
@@ -117,7 +121,7 @@ def variance(state: State, plan: Plan, s: int, k: int) -> float:
     """Return the variance of a state of one member of a block."""
     stride = int(plan.settings[STRIDE])
     total: float = covariance.variance(state.blocks[s], k, stride)
-    if state.deviations.shape[0] > 0 and plan.spans[s, 1] - plan.spans[s, 0] > 1:
+    if state.deviations.shape[0] > 0 and plan.spans[s, 1] - plan.spans[s, 0] > 1 and k < INERTIAL:
         total += (1.0 - 1.0 / state.blocks[s, covariance.MEMBERS]) * covariance.variance(state.deviations[s], k, stride)
     return total
 
@@ -132,7 +136,7 @@ def compare(state: State, plan: Plan, work: Work, innovation: Array) -> bool:
     Returns whether there is a block whose members can be compared.
     """
     innovation[WHO] = innovation[BACK] = -1.0
-    told = state.scalars[LEFT_OUT : LEFT_OUT + 5]
+    told = state.scalars[LEFT_OUT : LEFT_OUT + TOLD + 1]
     if told[TOLD] != 0.0:
         for k in range(TOLD):
             innovation[k] = told[k]
@@ -141,7 +145,7 @@ def compare(state: State, plan: Plan, work: Work, innovation: Array) -> bool:
     for s in range(plan.spans.shape[0]):
         if plan.spans[s, 1] - plan.spans[s, 0] > 1 and state.silent[0, s] < 0.0:
             some = True
-            _compare_block(state, plan, work, s, innovation)
+            _compare_block(state, plan, work, s, innovation, True)
     if some:
         update.update_derived(state, plan, work)
     return some
@@ -151,14 +155,13 @@ def compare(state: State, plan: Plan, work: Work, innovation: Array) -> bool:
 def compare_at_leap(state: State, plan: Plan, work: Work) -> None:
     """Compare at once after a leap; who is left out for it is told with the next comparison that is due."""
     state.scalars[LEAPT] = 0.0
-    told = state.scalars[LEFT_OUT : LEFT_OUT + 5]
+    told = state.scalars[LEFT_OUT : LEFT_OUT + TOLD + 1]
     if told[TOLD] != 0.0:
         return
-    work.told[BACK] = 1.0  # nobody comes back now
     work.told[WHO] = -1.0
     for s in range(plan.spans.shape[0]):
         if plan.spans[s, 1] - plan.spans[s, 0] > 1 and state.silent[0, s] < 0.0:
-            _compare_block(state, plan, work, s, work.told)
+            _compare_block(state, plan, work, s, work.told, False)
     update.update_derived(state, plan, work)
     if work.told[WHO] >= 0.0:
         for k in range(TOLD):
@@ -167,7 +170,7 @@ def compare_at_leap(state: State, plan: Plan, work: Work) -> None:
 
 
 @scalar_kernel
-def _compare_block(state: State, plan: Plan, work: Work, s: int, innovation: Array) -> None:
+def _compare_block(state: State, plan: Plan, work: Work, s: int, innovation: Array, due: bool) -> None:
     first, last, stride = plan.spans[s, 0], plan.spans[s, 1], int(plan.settings[STRIDE])
     own, gains = state.deviations[s], work.updates[s]
     _write_deviations(state, plan, s)
@@ -182,7 +185,7 @@ def _compare_block(state: State, plan: Plan, work: Work, s: int, innovation: Arr
         for i in range(first, last):
             _correct_by(state.rows[i // LANES], i % LANES, group, gains, stride)
         kalman.update_covariance(own, gains, stride)
-    _judge(state, plan, s, innovation)
+    _judge(state, plan, s, innovation, due)
     _apply(state, plan, s)
     update.feed_back(state, plan, s)
 
@@ -304,35 +307,44 @@ def _three(lanes: Array, field: int, lane: int) -> vehicle.Three:
 
 
 @scalar_kernel
-def _judge(state: State, plan: Plan, s: int, innovation: Array) -> None:
-    """Find who deviates by more than the others do, in the newest comparison and in two means over more of them."""
-    first, last = plan.spans[s, 0], plan.spans[s, 1]
-    interval = plan.settings[COMPARED_EVERY]
-    _remember(state, first, last, interval)
-    state.blocks[s, covariance.COMPARISONS] += 1.0
-    comparisons = state.blocks[s, covariance.COMPARISONS]
+def _judge(state: State, plan: Plan, s: int, innovation: Array, due: bool) -> None:
+    """Find who deviates by more than the others do, in the newest comparison and in two means over more of them.
+
+    One that is not due, after a leap, stands for itself: means and times are of those that come at an even interval.
+    """
+    first, last, block = plan.spans[s, 0], plan.spans[s, 1], state.blocks[s]
     counting = _counting(state, first, last)
     square = _mean_square(state, first, last, counting)
-    suspects = plan.settings[EXCLUDES] != 0.0
-    suspected = False
-    # one in a comparison, so that each is on record
-    while suspects and innovation[WHO] < 0.0 and counting > max(2, (last - first) // 2 + 1):
-        suspects = False
-        for length in range(3):
-            i = _worst(state, first, last, length)
-            over = _over(state, first, last, length, i, counting, _spread(length, interval, comparisons))
-            if over > 1.0:
-                _note(state.rows[i // LANES], i, length, over, innovation)
-                _leave_out(state, first, last, i, counting)
-                counting -= 1
-                suspects = suspected = True
-                break
+    if due:
+        _remember(state, first, last, plan.settings[COMPARED_EVERY])
+        block[covariance.COMPARISONS] += 1.0
+    suspected = _suspect(state, plan, s, counting, 3 if due else 1, innovation)
     for i in range(first, last):
-        _consider(state, plan, s, i, counting, innovation)
+        if state.rows[i // LANES, bank.EXCLUDED + i % LANES] != 0.0:
+            _keep(block, state.rows[i // LANES], i % LANES)
+            if due:
+                _consider(state, plan, s, i, counting - suspected, innovation)
     _weigh(state, plan, s)
-    if not suspected and plan.settings[ADAPTS] != 0.0:
+    if due and not suspected and plan.settings[ADAPTS] != 0.0:
         _adapt(state, plan, s, square)
-    innovation[SCALE], innovation[SQUARE] = state.blocks[s, covariance.OWN_SCALE], square
+    innovation[SCALE], innovation[SQUARE] = block[covariance.OWN_SCALE], square
+
+
+@scalar_kernel
+def _suspect(state: State, plan: Plan, s: int, counting: int, lengths: int, innovation: Array) -> bool:
+    """Leave out the worst if it deviates by too much; one in a comparison, so that each is on record."""
+    first, last = plan.spans[s, 0], plan.spans[s, 1]
+    if plan.settings[EXCLUDES] == 0.0 or innovation[WHO] >= 0.0 or counting <= (last - first) // 2 + 1:
+        return False
+    interval, comparisons = plan.settings[COMPARED_EVERY], state.blocks[s, covariance.COMPARISONS]
+    for length in range(lengths):
+        i = _worst(state, first, last, length)
+        over = _over(state, first, last, length, i, counting, _spread(length, interval, comparisons))
+        if over > 1.0:
+            _note(state.rows[i // LANES], i, length, over, innovation)
+            _leave_out(state, first, last, i, counting)
+            return True
+    return False
 
 
 @scalar_kernel
@@ -434,7 +446,7 @@ def _middle(state: State, first: int, last: int, worst: int, rank: int) -> float
 @scalar_kernel
 def _note(lanes: Array, i: int, length: int, over: float, innovation: Array) -> None:
     """Write who counts no more, and of what it deviates most."""
-    innovation[WHO], innovation[STATISTIC], innovation[LENGTH] = i, over, length
+    innovation[WHO], innovation[STATISTIC] = i, over
     largest = -1.0
     for group in range(3):
         total = 0.0
@@ -469,16 +481,8 @@ def _leave_out(state: State, first: int, last: int, worst: int, counting: int) -
 
 @scalar_kernel
 def _consider(state: State, plan: Plan, s: int, i: int, counting: int, innovation: Array) -> None:
-    """Let an IMU that was left out count again when it has agreed for a while, and keep one that is lost with all."""
-    lanes, lane = state.rows[i // LANES], i % LANES
-    if lanes[bank.EXCLUDED + lane] == 0.0:
-        return
-    interval = plan.settings[COMPARED_EVERY]
-    # what is wrong with it is no scale: as one it would grow without bounds where a gyro is stuck
-    for k in range(SCALES, bank.STATES):
-        lanes[bank.CORRECTION + k * LANES + lane] = 0.0
-    if not _square(lanes, lane, 0) < LOST:
-        _join_mean(state.blocks[s], lanes, lane, state.scalars[INTERVAL])
+    """Let an IMU that was left out count again when it has agreed for a while."""
+    lanes, lane, interval = state.rows[i // LANES], i % LANES, plan.settings[COMPARED_EVERY]
     largest = 0.0
     for length in range(3):
         spread = _spread(length, interval, state.blocks[s, covariance.COMPARISONS])
@@ -491,7 +495,19 @@ def _consider(state: State, plan: Plan, s: int, i: int, counting: int, innovatio
 
 
 @scalar_kernel
-def _join_mean(block: Array, lanes: Array, lane: int, interval: float) -> None:
+def _keep(block: Array, lanes: Array, lane: int) -> None:
+    """Keep an IMU that was left out with the others.
+
+    What is wrong with it is no scale: as one it would grow without bounds where a gyro is stuck.
+    """
+    for k in range(SCALES, bank.STATES):
+        lanes[bank.CORRECTION + k * LANES + lane] = 0.0
+    if not _square(lanes, lane, 0) < LOST:
+        _join_mean(block, lanes, lane)
+
+
+@scalar_kernel
+def _join_mean(block: Array, lanes: Array, lane: int) -> None:
     """Give an IMU position, velocity and attitude of the mean, as seen from where it is."""
     c = vehicle.matrix_at(block, covariance.MATRIX)
     vehicle.put_attitude(lanes, lane, c)
@@ -501,9 +517,8 @@ def _join_mean(block: Array, lanes: Array, lane: int, interval: float) -> None:
     spun = vehicle.cross(wx, wy, wz, lx, ly, lz)
     swept = vehicle.rotated(c, spun[0], spun[1], spun[2])
     for k in range(3):
-        metres = block[covariance.METRIC + k]
-        along = -arm[k] if k == 2 else arm[k]
-        lanes[bank.POSITION + k * LANES + lane] = block[covariance.POSITION + k] - along / abs(metres)
+        lanes[bank.POSITION + k * LANES + lane] = block[covariance.POSITION + k] - arm[k] / block[covariance.METRIC + k]
+        lanes[bank.AXES + k * LANES + lane] = 0.0
         lanes[bank.VELOCITY + k * LANES + lane] = block[covariance.VELOCITY + k] - swept[k]
     for k in range(bank.STATES):
         lanes[bank.CORRECTION + k * LANES + lane] = 0.0

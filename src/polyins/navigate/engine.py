@@ -337,7 +337,8 @@ def begin(navigators: Navigators, raw: Array, interval: float) -> None:
 def write(state: State, plan: Plan, outputs: Outputs, further: Further | None, k: int) -> None:
     """Write row k: the merged state and its variances.
 
-    Of several blocks that are apart the variance is their mean; joined, it is that of the mean of their errors.
+    Of several blocks that are apart the variance is their mean, or that of the mean of their errors where it is kept;
+    joined, it is the latter, too.
     """
     count, stride = plan.spans.shape[0], int(plan.settings[STRIDE])
     for i in range(10):
